@@ -1,0 +1,1 @@
+"""Photos in, a baked scene out. Knows no glTF, no USD and no HTTP."""

@@ -1,0 +1,1 @@
+"""Renderers of a BakedScene: `reference` (slow, readable, float64) and `raster` (fast). Import-free."""

@@ -20,7 +20,9 @@ def resolve_device(name: str = AUTO) -> str:
         return "cuda:0" if usable_gpus() > 0 else CPU
     match = re.fullmatch(r"cuda(?::(\d{1,3}))?", name)
     if match is None:
-        raise OptionInvalid("device", "must be auto, cpu, cuda or cuda:N", repr(name), "Leave it out, and the best one is chosen.")
+        raise OptionInvalid(
+            "device", "must be auto, cpu, cuda or cuda:N", repr(name), "Leave it out, and the best one is chosen."
+        )
     index = int(match.group(1) or 0)
     if index >= usable_gpus():
         raise OptionInvalid(

@@ -1,0 +1,134 @@
+// One job in the list.
+
+import { artifactUrl, viewerUrl } from "./api.js";
+import { formatAgo, formatBytes, formatPsnr } from "./format.js";
+import { showProblem } from "./notice.js";
+
+const STATE_NAMES = {
+  queued: "Waiting",
+  running: "In work",
+  succeeded: "Ready",
+  failed: "Failed",
+  cancelled: "Cancelled",
+};
+
+const STAGE_NAMES = {
+  read: "Reading the photos",
+  voxels: "Finding the rough shape",
+  field: "Training shape and appearance",
+  texels: "Refining the texture",
+  bake: "Baking texture pages",
+  export: "Writing the files",
+  measure: "Measuring the result",
+};
+
+const PREVIEW = "preview.png";
+const CONFIRM_MS = 4000;
+
+export class JobCard {
+  #job;
+  #shownPreview = "";
+
+  /** @param {{onCancel: (id: string) => void, onDelete: (id: string) => void}} actions */
+  constructor(job, actions) {
+    const template = document.getElementById("job-template");
+    this.element = template.content.firstElementChild.cloneNode(true);
+    this.#on("cancel", () => actions.onCancel(job.id));
+    this.#on("delete", () => this.#confirm(() => actions.onDelete(job.id)));
+    const image = this.#find(".job-picture img");
+    image.addEventListener("load", () => (image.hidden = false));
+    image.addEventListener("error", () => (image.hidden = true));
+    this.update(job);
+  }
+
+  get job() {
+    return this.#job;
+  }
+
+  update(job) {
+    this.#job = job;
+    this.element.dataset.state = job.state;
+    this.element.dataset.id = job.id;
+    this.#find("h3").textContent = nameOf(job);
+    this.#find(".state").textContent = STATE_NAMES[job.state] ?? job.state;
+    this.#find(".job-facts").textContent = factsOf(job);
+    showProblem(this.#find(".job-problem"), job.state === "failed" ? (job.problem ?? {}) : null);
+    this.#showProgress();
+    this.#showPicture();
+    this.#showActions();
+  }
+
+  #showProgress() {
+    const { state, stage, fraction, psnr } = this.#job;
+    this.#find(".job-progress").hidden = state !== "running";
+    const bar = this.#find("progress");
+    bar.value = fraction ?? 0;
+    bar.setAttribute("aria-label", `Progress of ${nameOf(this.#job)}`);
+    const parts = [STAGE_NAMES[stage] ?? stage ?? "Starting", `${Math.round(100 * (fraction ?? 0))} %`];
+    if (typeof psnr === "number") parts.push(formatPsnr(psnr));
+    this.#find(".job-stage").textContent = parts.join(" · ");
+  }
+
+  #showPicture() {
+    const job = this.#job;
+    if (!job.preview) return;
+    // The preview is rewritten while the job runs; a new address at every stage makes the browser look again.
+    const url = `${artifactUrl(job.id, PREVIEW)}?at=${job.state}-${Math.round(20 * (job.fraction ?? 0))}`;
+    if (url === this.#shownPreview) return;
+    this.#shownPreview = url;
+    const image = this.#find(".job-picture img");
+    image.alt = `Preview of ${nameOf(job)}`;
+    image.src = url;
+  }
+
+  #showActions() {
+    const { id, state } = this.#job;
+    const ended = ["succeeded", "failed", "cancelled"].includes(state);
+    this.#show("view", state === "succeeded", viewerUrl(id));
+    this.#show("download", state === "succeeded", artifactUrl(id, "scene.glb"));
+    this.#find("[data-action=download]").setAttribute("download", `${nameOf(this.#job)}.glb`);
+    this.#show("cancel", !ended);
+    this.#show("delete", ended);
+  }
+
+  #show(action, shown, href) {
+    const button = this.#find(`[data-action=${action}]`);
+    button.hidden = !shown;
+    if (href) button.href = href;
+  }
+
+  // The first press asks, the second within a few seconds deletes.
+  #confirm(then) {
+    const button = this.#find("[data-action=delete]");
+    if (button.dataset.asked) return then();
+    button.dataset.asked = "yes";
+    button.textContent = "Really delete?";
+    return setTimeout(() => {
+      delete button.dataset.asked;
+      button.textContent = "Delete";
+    }, CONFIRM_MS);
+  }
+
+  #on(action, listener) {
+    this.#find(`[data-action=${action}]`).addEventListener("click", listener);
+  }
+
+  #find(selector) {
+    return this.element.querySelector(selector);
+  }
+}
+
+const nameOf = (job) => job.name || job.options?.name || `Asset ${job.id.slice(0, 8)}`;
+
+function factsOf(job) {
+  const glb = artifactNamed(job, "scene.glb");
+  const parts = [job.options?.preset, formatAgo(job.created)];
+  if (job.state === "succeeded" && typeof job.psnr === "number") parts.push(formatPsnr(job.psnr));
+  if (glb?.bytes) parts.push(formatBytes(glb.bytes));
+  return parts.filter(Boolean).join(" · ");
+}
+
+// Artefacts come as names or as objects with a name.
+function artifactNamed(job, name) {
+  return (job.artifacts ?? []).find((artifact) => (artifact.name ?? artifact) === name);
+}

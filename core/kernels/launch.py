@@ -17,7 +17,7 @@ from typing import Any
 
 import warp as wp
 
-wp.config.log_level = wp.LOG_WARNING  # no banner, no compile messages
+wp.config.log_level = wp.LOG_ERROR  # no banner, no compile messages, no warning that there is no GPU
 
 MAX_THREADS = 8
 RANGES_PER_THREAD = 4  # rays differ in cost: smaller ranges even the threads out

@@ -1,0 +1,125 @@
+"""A .glb taken apart, with every access checked."""
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+
+from core.errors import AssetInvalid
+
+_MAGIC = 0x46546C67  # "glTF"
+_JSON = 0x4E4F534A
+_BIN = 0x004E4942
+_HEADER = struct.Struct("<III")
+_CHUNK = struct.Struct("<II")
+_COMPONENTS: dict[int, np.dtype[Any]] = {
+    5121: np.dtype("u1"),
+    5123: np.dtype("<u2"),
+    5125: np.dtype("<u4"),
+    5126: np.dtype("<f4"),
+}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
+REMEDY = "Download the file again, or convert the capture again."
+
+
+def invalid(subject: str, rule: str, received: str = "") -> AssetInvalid:
+    """The error for a file that breaks `rule`."""
+    return AssetInvalid(subject, rule, received, REMEDY)
+
+
+class Document:
+    """glTF JSON and its binary chunk.
+
+    Attributes:
+        json: the JSON chunk.
+        binary: the binary chunk, without padding rules checked.
+
+    Raises:
+        AssetInvalid
+    """
+
+    def __init__(self, data: bytes) -> None:
+        chunk, self.binary = _chunks(data)
+        try:
+            self.json: dict[str, Any] = json.loads(chunk, parse_constant=_refuse_constant)
+        except (ValueError, RecursionError) as error:  # UnicodeDecodeError and JSONDecodeError are ValueErrors
+            raise invalid("glTF JSON", "must be valid JSON", str(error)[:120]) from error
+        if not isinstance(self.json, dict):
+            raise invalid("glTF JSON", "must be an object", type(self.json).__name__)
+
+    def item(self, kind: str, index: Any) -> dict[str, Any]:
+        """`json[kind][index]`, an object."""
+        items = self.json.get(kind)
+        if not isinstance(items, list):
+            raise invalid(f"glTF JSON, {kind}", "must be an array", type(items).__name__)
+        valid = isinstance(index, int) and not isinstance(index, bool) and 0 <= index < len(items)
+        if not valid or not isinstance(items[index], dict):
+            raise invalid(f"glTF JSON, {kind}", f"must have an object at {str(index)[:20]}", f"{len(items)} items")
+        found: dict[str, Any] = items[index]
+        return found
+
+    def view_bytes(self, index: Any) -> memoryview:
+        """The bytes of a buffer view."""
+        view = self.item("bufferViews", index)
+        subject = f"bufferViews[{index}]"
+        if view.get("buffer") != 0 or "uri" in self.item("buffers", 0) or "byteStride" in view:
+            raise invalid(subject, "must lie unstrided in the file's own binary chunk", str(view)[:80])
+        return _slice(memoryview(self.binary), view.get("byteOffset", 0), view.get("byteLength"), subject)
+
+    def accessor(self, index: Any, width: str, components: tuple[int, ...]) -> np.ndarray:
+        """[count, n] (or [count] for SCALAR) of an accessor whose type and component type must be as given."""
+        accessor = self.item("accessors", index)
+        subject = f"accessors[{index}]"
+        component: Any = accessor.get("componentType")
+        count: Any = accessor.get("count")
+        if accessor.get("type") != width or component not in components or "sparse" in accessor:
+            raise invalid(subject, f"must be a plain {width} of component type {components}", str(accessor)[:80])
+        if not _is_length(count):
+            raise invalid(subject, "must have a count", str(count)[:20])
+        dtype: np.dtype[Any] = np.dtype(_COMPONENTS[component])
+        view = self.view_bytes(accessor.get("bufferView"))
+        length = count * _WIDTHS[width] * dtype.itemsize
+        values = np.frombuffer(bytes(_slice(view, accessor.get("byteOffset", 0), length, subject)), dtype)
+        return values if width == "SCALAR" else values.reshape(count, _WIDTHS[width])
+
+    def image_bytes(self, texture: Any) -> bytes:
+        """The image file behind a texture."""
+        image = self.item("images", self.item("textures", texture).get("source"))
+        return bytes(self.view_bytes(image.get("bufferView")))
+
+
+def _chunks(data: bytes) -> tuple[bytes, bytes]:
+    """(JSON chunk, binary chunk) of a .glb (glTF 2.0 specification, section 4)."""
+    if len(data) < _HEADER.size:
+        raise invalid("file", "must be a binary glTF file", f"{len(data)} bytes")
+    magic, version, length = _HEADER.unpack_from(data)
+    if magic != _MAGIC or version != 2:
+        raise invalid("file", "must be a binary glTF 2.0 file", "another format or version")
+    if length != len(data):
+        raise invalid("file", f"must be {length} bytes long, as its header says", f"{len(data)} bytes")
+    chunks: dict[int, bytes] = {}
+    offset = _HEADER.size
+    while offset < length:
+        header = _slice(memoryview(data), offset, _CHUNK.size, "chunk header")
+        size, kind = _CHUNK.unpack(header)
+        content = _slice(memoryview(data), offset + _CHUNK.size, size, "chunk")
+        chunks.setdefault(kind, bytes(content))
+        offset += _CHUNK.size + size
+    if _JSON not in chunks or _BIN not in chunks:
+        raise invalid("file", "must have a JSON chunk and a binary chunk", f"{len(chunks)} chunks")
+    return chunks[_JSON], chunks[_BIN]
+
+
+def _slice(data: memoryview, offset: Any, length: Any, subject: str) -> memoryview:
+    if not _is_length(offset) or not _is_length(length) or offset + length > len(data):
+        raise invalid(subject, f"must lie within {len(data)} bytes", f"{length} bytes from {offset}"[:80])
+    return data[offset : offset + length]
+
+
+def _is_length(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a JSON number")

@@ -1,0 +1,118 @@
+"""The vendor extension's JSON. Specification: docs/extensions/POLYFIELD_materials_neural/README.md."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from core.baked import ShaderNetwork
+from core.camera import Camera
+from core.errors import AssetInvalid
+from exporters.glsl import PROGRAMS, VERSIONS, Program, ShaderSources, shader_sources
+
+NAME = "POLYFIELD_materials_neural"
+CODING = "unorm8"
+ACTIVATIONS = ("relu", "relu", "sigmoid")
+
+
+def material_json(feature_textures: tuple[int, int], network: int = 0) -> dict[str, Any]:
+    """The extension of a material whose features are in two textures, given by index."""
+    textures = [{"index": index} for index in feature_textures]
+    return {"network": network, "featureTextures": textures, "coding": CODING}
+
+
+def network_json(network: ShaderNetwork) -> dict[str, Any]:
+    """Normative weights, and shader texts in every dialect."""
+    layers = [
+        {"weights": [shortest_numbers(row) for row in weight], "bias": shortest_numbers(bias), "activation": activation}
+        for weight, bias, activation in zip(network.weights, network.biases, ACTIVATIONS, strict=True)
+    ]
+    shaders = {dialect: _sources_json(shader_sources(network, dialect)) for dialect in VERSIONS}
+    return {"layers": layers, "shaders": shaders}
+
+
+def view_json(camera: Camera, node: int) -> dict[str, Any]:
+    """A camera of the capture, exactly; `node` carries glTF's approximation of it."""
+    return {
+        "node": node,
+        "imageSize": [int(n) for n in camera.size_px],
+        "focalLength": [float(n) for n in camera.focal_px],
+        "principalPoint": [float(n) for n in camera.centre_px],
+        "objectFromCamera": column_major(camera.world_from_camera),
+    }
+
+
+def network_from_json(json: dict[str, Any]) -> ShaderNetwork:
+    """The network of its JSON; float32 numbers come back exactly.
+
+    Raises:
+        AssetInvalid; SceneInvalid for wrong shapes or numbers that are not finite.
+        KeyError, TypeError, ValueError for JSON of another structure.
+    """
+    layers = json["layers"]
+    activations = tuple(layer["activation"] for layer in layers)
+    if activations != ACTIVATIONS:
+        raise AssetInvalid("network", f"must have the activations {ACTIVATIONS}", str(activations)[:80])
+    w0, w1, w2 = (numbers(layer["weights"], "network weights").astype(np.float32) for layer in layers)
+    b0, b1, b2 = (numbers(layer["bias"], "network biases").astype(np.float32) for layer in layers)
+    return ShaderNetwork((w0, w1, w2), (b0, b1, b2))
+
+
+def view_from_json(json: dict[str, Any], name: str) -> Camera:
+    """The camera of a view.
+
+    Raises:
+        AssetInvalid; PosesInvalid, PoseNotRigid or PoseNotFinite from the camera's own rules.
+        KeyError, TypeError, ValueError for JSON of another structure.
+    """
+    fx, fy = numbers(json["focalLength"], "view's focal length").tolist()
+    cx, cy = numbers(json["principalPoint"], "view's principal point").tolist()
+    width, height = numbers(json["imageSize"], "view's image size").tolist()
+    pose = matrix_from_column_major(json["objectFromCamera"], "view's pose")
+    return Camera(name, pose, (float(fx), float(fy)), (float(cx), float(cy)), (int(width), int(height)))
+
+
+def shaders_from_json(json: dict[str, Any]) -> dict[str, ShaderSources]:
+    """Shader texts by dialect, as stored; empty where the asset has none.
+
+    Raises:
+        KeyError, TypeError, ValueError for JSON of another structure.
+    """
+    shaders = {}
+    for dialect, sources in json.get("shaders", {}).items():
+        programs = [sources["programs"][name] for name in PROGRAMS]
+        texts = [Program(str(program["vertex"]), str(program["fragment"])) for program in programs]
+        shaders[str(dialect)] = ShaderSources(str(sources["version"]), *texts)
+    return shaders
+
+
+def column_major(matrix: np.ndarray) -> list[float]:
+    """16 numbers, as glTF writes a 4x4 matrix."""
+    return [float(n) for n in np.asarray(matrix, np.float64).T.ravel()]
+
+
+def matrix_from_column_major(values: Any, subject: str) -> np.ndarray:
+    """[4, 4] float64 of 16 numbers."""
+    return numbers(values, subject).astype(np.float64).reshape(4, 4).T.copy()
+
+
+def numbers(values: Any, subject: str) -> np.ndarray:
+    """An array of JSON numbers (never of strings or booleans).
+
+    Raises:
+        AssetInvalid: something else than numbers. ValueError: ragged lists.
+    """
+    array = np.asarray(values)
+    if array.dtype.kind not in "iuf":
+        raise AssetInvalid(subject, "must hold numbers", str(values)[:80])
+    with np.errstate(over="ignore"):  # too large for float32 becomes infinity, which its user refuses
+        return array
+
+
+def shortest_numbers(values: np.ndarray) -> list[float]:
+    """Float32 values as the shortest decimals that read back as the same float32."""
+    return [float(str(value)) for value in np.asarray(values, np.float32)]
+
+
+def _sources_json(sources: ShaderSources) -> dict[str, Any]:
+    return {"version": sources.version, "programs": {name: asdict(getattr(sources, name)) for name in PROGRAMS}}

@@ -1,0 +1,140 @@
+"""A .glb with POLYFIELD_materials_neural, back as the baked scene it was written from."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from core.baked import BakedScene, Page
+from core.camera import Camera
+from core.conventions import is_opaque
+from core.errors import AssetInvalid, PolyfieldError
+from exporters.glsl import ShaderSources
+from exporters.gltf import extension
+from exporters.gltf.document import Document, invalid
+from exporters.gltf.limits import check_size
+from exporters.gltf.png import decode_png, png_size
+
+_FLOAT = (5126,)
+_INDEX = (5121, 5123, 5125)
+_WHITE = [1.0, 1.0, 1.0]
+
+
+def read_glb(data: bytes) -> BakedScene:
+    """The scene in a .glb written by `write_glb`, bit for bit.
+
+    Raises:
+        AssetInvalid: damaged, or not a file of this kind. Nothing else, whatever the bytes.
+    """
+    with _only_asset_invalid():
+        document = Document(data)
+        root = _root_extension(document)
+        return BakedScene(
+            pages=_pages(document),
+            network=extension.network_from_json(_network(root)),
+            background=_background(root),
+            asset_from_object=_asset_from_object(document),
+            cameras=_cameras(document, root),
+        )
+
+
+def read_shaders(data: bytes) -> dict[str, ShaderSources]:
+    """The shader texts stored in a .glb, unchanged, by dialect ("essl300", "glsl330").
+
+    Raises:
+        AssetInvalid
+    """
+    with _only_asset_invalid():
+        return extension.shaders_from_json(_network(_root_extension(Document(data))))
+
+
+@contextmanager
+def _only_asset_invalid() -> Iterator[None]:
+    """Turns what JSON of an unexpected structure leads to, and the scene's own rules, into AssetInvalid."""
+    try:
+        yield
+    except AssetInvalid:
+        raise
+    except PolyfieldError as error:
+        raise invalid(error.subject, error.rule, error.received) from error
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
+        raise invalid(extension.NAME, "must follow its schema", f"{type(error).__name__}: {error}"[:120]) from error
+
+
+def _root_extension(document: Document) -> dict[str, Any]:
+    root: dict[str, Any] | None = document.json.get("extensions", {}).get(extension.NAME)
+    if root is None:
+        raise invalid("file", f"must have the extension {extension.NAME}", "a glTF file without it")
+    return root
+
+
+def _network(root: dict[str, Any]) -> dict[str, Any]:
+    networks = root["networks"]
+    if len(networks) != 1:
+        raise invalid("networks", "must be exactly one", str(len(networks)))
+    network: dict[str, Any] = networks[0]
+    return network
+
+
+def _background(root: dict[str, Any]) -> tuple[float, float, float]:
+    red, green, blue = extension.numbers(root.get("background", _WHITE), "background").tolist()
+    return float(red), float(green), float(blue)
+
+
+def _asset_from_object(document: Document) -> np.ndarray:
+    """The transform of the scene's root node, the object."""
+    (root,) = document.item("scenes", document.json.get("scene", 0))["nodes"]
+    node = document.item("nodes", root)
+    if "matrix" not in node:
+        return np.eye(4)
+    return extension.matrix_from_column_major(node["matrix"], "object node's matrix")
+
+
+def _cameras(document: Document, root: dict[str, Any]) -> tuple[Camera, ...]:
+    views = root.get("views", [])
+    return tuple(extension.view_from_json(v, str(document.item("nodes", v["node"]).get("name", ""))) for v in views)
+
+
+def _pages(document: Document) -> tuple[Page, ...]:
+    """One page per primitive with a neural material, in the order of the meshes."""
+    found = []
+    for mesh in document.json.get("meshes", []):
+        for primitive in mesh["primitives"]:
+            material = document.item("materials", primitive.get("material"))
+            if extension.NAME in material.get("extensions", {}):
+                found.append((primitive, _page_pngs(document, material)))
+    check_size((png_size(pngs[0], "feature texture") for _, pngs in found), AssetInvalid)
+    return tuple(_page(document, primitive, pngs) for primitive, pngs in found)
+
+
+def _page_pngs(document: Document, material: dict[str, Any]) -> list[bytes]:
+    """The PNG files of features 0-3, features 4-7 and the fallback colour; equal sizes, nothing decoded yet."""
+    neural = material["extensions"][extension.NAME]
+    if neural["coding"] != extension.CODING or neural["network"] != 0:
+        raise invalid("neural material", f"must have coding {extension.CODING} and network 0", str(neural)[:80])
+    features0, features1 = (texture["index"] for texture in neural["featureTextures"])
+    color = material["pbrMetallicRoughness"]["baseColorTexture"]["index"]
+    pngs = [document.image_bytes(index) for index in (features0, features1, color)]
+    sizes = [png_size(png, "page's texture") for png in pngs]
+    if len(set(sizes)) != 1:
+        raise invalid("page's textures", "must have one size", str(sizes))
+    return pngs
+
+
+def _page(document: Document, primitive: dict[str, Any], pngs: list[bytes]) -> Page:
+    features0, features1, color = (decode_png(png, "page's texture") for png in pngs)
+    features_u8 = np.concatenate([features0, features1], -1)
+    if not np.array_equal(color[..., 3] > 0, is_opaque(features_u8)):
+        raise invalid("page's textures", "must agree on where holes are", "a fallback with other holes")
+    if primitive.get("mode", 4) != 4:
+        raise invalid("primitive", "must be of triangles", f"mode {str(primitive['mode'])[:20]}")
+    attributes = primitive["attributes"]
+    indices = document.accessor(primitive["indices"], "SCALAR", _INDEX)
+    return Page(
+        features_u8,
+        np.ascontiguousarray(color[..., :3]),
+        document.accessor(attributes["POSITION"], "VEC3", _FLOAT).astype(np.float32),
+        document.accessor(attributes["TEXCOORD_0"], "VEC2", _FLOAT).astype(np.float32),
+        indices.astype(np.uint32).reshape(-1, 3),
+    )

@@ -39,6 +39,7 @@ def usable_gpus() -> int:
     import torch
     import warp
 
-    import core.kernels.launch  # noqa: F401  (configures Warp before its first use)
+    from core.kernels.start import start_warp
 
+    start_warp()
     return min(warp.get_cuda_device_count(), torch.cuda.device_count()) if torch.cuda.is_available() else 0

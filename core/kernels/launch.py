@@ -17,7 +17,9 @@ from typing import Any
 
 import warp as wp
 
-wp.config.log_level = wp.LOG_ERROR  # no banner, no compile messages, no warning that there is no GPU
+from core.kernels.start import start_warp
+
+start_warp()
 
 MAX_THREADS = 8
 RANGES_PER_THREAD = 4  # rays differ in cost: smaller ranges even the threads out

@@ -47,7 +47,7 @@ class Rasteriser:
         self._boxes = wp.empty(int(self._first_triangle[-1]), dtype=wp.vec4i, device=device)
 
     def deferred(self, camera: Camera) -> np.ndarray:
-        """The anti-aliased image [h, w, 4] float32 in [0, 1], colour premultiplied by coverage: as `render_deferred`."""
+        """The anti-aliased image, [h, w, 4] float32 in [0, 1], premultiplied by coverage: as `render_deferred`."""
         return self._image(camera, subpixel_camera(camera), SUBPIXELS_PER_SIDE)
 
     def forward(self, camera: Camera) -> np.ndarray:

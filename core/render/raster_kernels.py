@@ -1,14 +1,17 @@
 """Warp kernels of the rasteriser: a visibility buffer, then shading. Compare reference.py, which is the same in NumPy.
 
-Frames and symbols: vertices are in the camera frame (float64, the camera at the origin), so neither the scene's scale nor
-its distance from the frame's origin costs precision. A ray through a sample is d = (x, y, -1), so that t is the depth.
-`b` are a triangle's three edge functions at d, proportional to the barycentric coordinates.
+Frames and symbols: vertices are in the camera frame (float64, the camera at the origin), so neither the scene's scale
+nor its distance from the frame's origin costs precision. A ray through a sample is d = (x, y, -1), so that t is the
+depth. `b0, b1, b2` are a triangle's edge functions at d, proportional to the barycentric coordinates.
 
-The buffer holds one key per sample: depth, quantised linearly over the scene's depth range, in the upper 32 bits and the
-triangle in the lower. Its minimum is the nearest triangle, the first of equally near ones.
+The buffer holds one key per sample: depth, quantised linearly over the scene's depth range, in the upper 32 bits, and
+the triangle in the lower. Its minimum is the nearest triangle, the first of equally near ones.
 
 Texels of all pages lie in one array, page after page, row by row, a texel's 8 bytes in one integer (channel 0 lowest).
 """
+
+# `and` does not short-circuit in a kernel, and variables that a loop changes must be made by int() or float().
+# ruff: noqa: SIM102, UP018, RUF046
 
 import warp as wp
 
@@ -17,7 +20,6 @@ wp.set_module_options({"enable_backward": False})
 EMPTY = 0xFFFFFFFFFFFFFFFF  # a key behind everything
 DEPTH_STEPS = 4294967294.0  # the deepest key still lies before EMPTY
 
-HIDDEN = wp.constant(16)
 vec16 = wp.types.vector(length=16, dtype=wp.float32)
 vec8 = wp.types.vector(length=8, dtype=wp.float32)
 
@@ -190,7 +192,7 @@ def draw(
     bands: int,
     keys: wp.array(dtype=wp.uint64),
 ):
-    """Index = band * triangles + triangle. Every band of rows is one thread's own on the CPU: atomics are none there."""
+    """Index = band * triangles + triangle. On the CPU, where atomics are none, a band of rows is one thread's own."""
     i = first + wp.tid()
     count = surface.triangles.shape[0]
     band = i / count

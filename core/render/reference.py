@@ -4,15 +4,15 @@ Every other renderer (raster.py, the shaders) is tested against this one.
 
 Visibility is by homogeneous ray-triangle tests: with the camera at the origin, a ray direction d meets the plane of
 (v0, v1, v2) at t d, where t = det(v0, v1, v2) / (b0 + b1 + b2) and b0 = d.(v1 x v2), b1 = d.(v2 x v0),
-b2 = d.(v0 x v1) are proportional to the barycentric coordinates. The ray hits the triangle where the three have the same
-sign and t > 0. Nothing is projected, so nothing has to be clipped, and texture coordinates are perspective-correct.
+b2 = d.(v0 x v1) are proportional to the barycentric coordinates. The ray hits the triangle where the three have the
+same sign and t > 0. Nothing is projected, so nothing has to be clipped, and texture coordinates are perspective-correct.
 """
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from core.baked import BakedScene, Page
+from core.baked import BakedScene
 from core.camera import Camera
 from core.conventions import is_opaque
 from core.render.visibility import NOTHING, SUBPIXELS_PER_SIDE, Visibility, subpixel_camera

@@ -15,8 +15,8 @@ CODING = "unorm8"
 ACTIVATIONS = ("relu", "relu", "sigmoid")
 
 
-def material_json(feature_textures: tuple[int, int], network: int = 0) -> dict[str, Any]:
-    """The extension of a material whose features are in two textures, given by index."""
+def primitive_json(feature_textures: tuple[int, int], network: int = 0) -> dict[str, Any]:
+    """The extension of a mesh primitive whose features are in two textures, given by index."""
     textures = [{"index": index} for index in feature_textures]
     return {"network": network, "featureTextures": textures, "coding": CODING}
 

@@ -97,23 +97,23 @@ def _cameras(document: Document, root: dict[str, Any]) -> tuple[Camera, ...]:
 
 
 def _pages(document: Document) -> tuple[Page, ...]:
-    """One page per primitive with a neural material, in the order of the meshes."""
+    """One page per primitive with the extension, in the order of the meshes."""
     found = []
     for mesh in document.json.get("meshes", []):
         for primitive in mesh["primitives"]:
-            material = document.item("materials", primitive.get("material"))
-            if extension.NAME in material.get("extensions", {}):
-                found.append((primitive, _page_pngs(document, material)))
+            if extension.NAME in primitive.get("extensions", {}):
+                found.append((primitive, _page_pngs(document, primitive)))
     check_size((png_size(pngs[0], "feature texture") for _, pngs in found), AssetInvalid)
     return tuple(_page(document, primitive, pngs) for primitive, pngs in found)
 
 
-def _page_pngs(document: Document, material: dict[str, Any]) -> list[bytes]:
+def _page_pngs(document: Document, primitive: dict[str, Any]) -> list[bytes]:
     """The PNG files of features 0-3, features 4-7 and the fallback colour; equal sizes, nothing decoded yet."""
-    neural = material["extensions"][extension.NAME]
+    neural = primitive["extensions"][extension.NAME]
     if neural["coding"] != extension.CODING or neural["network"] != 0:
-        raise invalid("neural material", f"must have coding {extension.CODING} and network 0", str(neural)[:80])
+        raise invalid("neural primitive", f"must have coding {extension.CODING} and network 0", str(neural)[:80])
     features0, features1 = (texture["index"] for texture in neural["featureTextures"])
+    material = document.item("materials", primitive.get("material"))
     color = material["pbrMetallicRoughness"]["baseColorTexture"]["index"]
     pngs = [document.image_bytes(index) for index in (features0, features1, color)]
     sizes = [png_size(png, "page's texture") for png in pngs]

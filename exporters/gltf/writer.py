@@ -72,8 +72,10 @@ def _add_pages(document: gltf.GLTF2, blob: Blob, scene: BakedScene) -> None:
             name = f"page{number}.{label}"
             document.images.append(gltf.Image(name=name, mimeType="image/png", bufferView=blob.append(png)))
             document.textures.append(gltf.Texture(name=name, sampler=0, source=len(document.images) - 1))
-        document.materials.append(_material(number, first))
-        document.meshes.append(gltf.Mesh(name=f"page{number}", primitives=[_primitive(document, blob, page, number)]))
+        document.materials.append(_fallback_material(number, first + 2))
+        primitive = _primitive(document, blob, page, number)
+        primitive.extensions = {extension.NAME: extension.primitive_json((first, first + 1))}
+        document.meshes.append(gltf.Mesh(name=f"page{number}", primitives=[primitive]))
         document.nodes.append(gltf.Node(name=f"page{number}", mesh=number))
 
 
@@ -83,19 +85,17 @@ def _page_images(page: Page) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return page.features_u8[..., :4], page.features_u8[..., 4:], np.concatenate([page.colors_u8, alpha], -1)
 
 
-def _material(number: int, first_texture: int) -> gltf.Material:
+def _fallback_material(number: int, color_texture: int) -> gltf.Material:
+    """What stock viewers show. Ours is the primitive's: KHR_materials_unlit excludes other extensions on a material."""
     return gltf.Material(
         name=f"page{number}",
         alphaMode=gltf.MASK,
         alphaCutoff=ALPHA_CUTOFF,
         doubleSided=True,
         pbrMetallicRoughness=gltf.PbrMetallicRoughness(
-            baseColorTexture=gltf.TextureInfo(index=first_texture + 2), metallicFactor=0.0, roughnessFactor=1.0
+            baseColorTexture=gltf.TextureInfo(index=color_texture), metallicFactor=0.0, roughnessFactor=1.0
         ),
-        extensions={
-            "KHR_materials_unlit": {},
-            extension.NAME: extension.material_json((first_texture, first_texture + 1)),
-        },
+        extensions={"KHR_materials_unlit": {}},
     )
 
 

@@ -1,0 +1,103 @@
+// GLTFLoader plug-in for POLYFIELD_materials_neural. The extension's README is the specification.
+
+import { MeshBasicMaterial } from "three";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { readFeatureTexture } from "./feature-texture.js";
+import { NeuralMaterial } from "./neural-material.js";
+
+export const EXTENSION = "POLYFIELD_materials_neural";
+const DIALECT = "essl300";
+
+/**
+ * Loads a .glb.
+ *
+ * @param {ArrayBuffer} bytes
+ * @returns {Promise<object>} GLTFLoader's result; `gltf.neural` is null where the file lacks the extension, otherwise
+ *   `{parts, network, background, views}`, see NeuralExtension.
+ */
+export async function loadGlb(bytes) {
+  const loader = new GLTFLoader();
+  loader.register((parser) => new NeuralExtension(parser));
+  return loader.parseAsync(bytes, "");
+}
+
+/**
+ * Gives `gltf.neural`:
+ *   parts       [{mesh, material: NeuralMaterial, loadFallback: () => Promise<Material>}], one per textured mesh
+ *   shaders     the three GLSL programs of the asset's network
+ *   background  sRGB [r, g, b] in [0, 1]
+ *   views       the capture's cameras as the extension gives them, each with a `name`
+ */
+class NeuralExtension {
+  name = EXTENSION;
+  #parser;
+
+  constructor(parser) {
+    this.#parser = parser;
+  }
+
+  // A neural material needs no fallback texture: decoding it would cost 64 MB per page. The loader may clone what is
+  // returned here (meshes without normals), so the real material takes its place only at the end.
+  loadMaterial(index) {
+    return this.#materialExtension(index) ? Promise.resolve(new MeshBasicMaterial()) : null;
+  }
+
+  async afterRoot(gltf) {
+    const { json, associations } = this.#parser;
+    const root = json.extensions?.[EXTENSION];
+    gltf.neural = null;
+    if (!root) return;
+    const shaders = shadersOf(root.networks[0]);
+    const materials = new Map();
+    const parts = [];
+    for (const mesh of meshesOf(gltf.scene)) {
+      const { meshes, primitives } = associations.get(mesh) ?? {};
+      const index = json.meshes[meshes]?.primitives[primitives ?? 0].material;
+      const extension = this.#materialExtension(index);
+      if (!extension) continue;
+      if (!materials.has(index)) materials.set(index, this.#readMaterial(extension, shaders));
+      // Straight to the parser's own method, past loadMaterial above.
+      parts.push({ mesh, material: await materials.get(index), loadFallback: () => this.#parser.loadMaterial(index) });
+    }
+    const views = (root.views ?? []).map((view, i) => ({ ...view, name: nameOfView(json, view) || `View ${i + 1}` }));
+    if (parts.length > 0) gltf.neural = { parts, shaders, background: root.background ?? [1, 1, 1], views };
+  }
+
+  // The extension sits on the primitive (KHR_materials_unlit excludes others on its material); each page has a material
+  // of its own, so a material's index finds it.
+  #materialExtension(index) {
+    const primitives = (this.#parser.json.meshes ?? []).flatMap((mesh) => mesh.primitives);
+    return primitives.find((primitive) => primitive.material === index)?.extensions?.[EXTENSION];
+  }
+
+  async #readMaterial({ network, coding, featureTextures }, shaders) {
+    if (network !== 0) throw new Error(`This viewer shows assets with one network, but a material uses number ${network}.`);
+    if (coding !== "unorm8") throw new Error(`This viewer reads features coded as "unorm8", but got "${coding}".`);
+    const textures = await Promise.all(featureTextures.map(({ index }) => this.#readTexture(index)));
+    return new NeuralMaterial(textures, shaders);
+  }
+
+  async #readTexture(index) {
+    const { json } = this.#parser;
+    const image = json.images[json.textures[index].source];
+    const bytes = await this.#parser.getDependency("bufferView", image.bufferView);
+    return readFeatureTexture(new Blob([bytes], { type: image.mimeType }));
+  }
+}
+
+function shadersOf(network) {
+  const shaders = network?.shaders?.[DIALECT];
+  if (!shaders) throw new Error(`The asset has no shader text for ${DIALECT} (WebGL2). Export it again.`);
+  return shaders;
+}
+
+function meshesOf(scene) {
+  const meshes = [];
+  scene.traverse((object) => object.isMesh && meshes.push(object));
+  return meshes;
+}
+
+function nameOfView(json, view) {
+  const node = json.nodes[view.node];
+  return node?.name ?? json.cameras?.[node?.camera]?.name;
+}

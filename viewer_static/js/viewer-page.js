@@ -1,0 +1,87 @@
+// The viewer: one asset on a stage, with its controls.
+
+import { sourceOfAddress, sourceOfFile } from "./asset-source.js";
+import { hideMessage, showLoading, showMessage } from "./message.js";
+import { hasWebGL2 } from "./webgl2.js";
+
+const byId = (id) => document.getElementById(id);
+let viewer = null;
+
+/** For tests and measurements; `ready` resolves when the address's asset is on the stage. */
+window.polyfield = { ready: start() };
+
+async function start() {
+  if (!hasWebGL2()) {
+    showMessage({
+      title: "WebGL2 is missing",
+      text:
+        "The viewer draws with WebGL2, which this browser does not offer.\n" +
+        "Update the browser, or turn on “graphics acceleration” in its settings, then load this page again.",
+      canOpen: false,
+    });
+    return;
+  }
+  viewer = await makeViewer();
+  listenForFiles();
+  const source = sourceOfAddress();
+  if (source) await show(source);
+  else showMessage({ title: "Open an asset", text: "Drop a .glb anywhere on this page, or choose one." });
+}
+
+// three.js is fetched only where it can run.
+async function makeViewer() {
+  const [{ Stage }, { Hud }, { PixelProbe }, { loadGlb }] = await Promise.all([
+    import("./stage.js"),
+    import("./hud.js"),
+    import("./pixel-probe.js"),
+    import("./neural-loader.js"),
+  ]);
+  const stage = new Stage(byId("canvas"));
+  const probe = new PixelProbe(stage);
+  window.polyfield.renderToPixels = (...args) => probe.renderToPixels(...args);
+  window.polyfield.readFeatureTexture = (...args) => probe.readFeatureTexture(...args);
+  window.polyfield.stage = stage;
+  byId("canvas").addEventListener("webglcontextlost", onContextLost);
+  return { stage, hud: new Hud(stage), loadGlb };
+}
+
+async function show(source) {
+  showLoading(NaN);
+  try {
+    const bytes = await source.read(showLoading);
+    showLoading(NaN);
+    const gltf = await viewer.loadGlb(bytes);
+    hideMessage();
+    viewer.stage.setAsset(gltf);
+    viewer.hud.setAsset(source, bytes.byteLength);
+  } catch (error) {
+    showMessage({ title: "This asset cannot be shown", text: [error.message, error.remedy].filter(Boolean).join("\n") });
+  } finally {
+    showLoading(null);
+  }
+}
+
+function listenForFiles() {
+  const veil = byId("drop-veil");
+  const open = (file) => file && show(sourceOfFile(file));
+  byId("pick-glb").addEventListener("change", (event) => open(event.target.files[0]));
+  window.addEventListener("dragover", (event) => {
+    event.preventDefault();
+    veil.classList.add("over");
+  });
+  window.addEventListener("dragleave", (event) => event.relatedTarget || veil.classList.remove("over"));
+  window.addEventListener("drop", (event) => {
+    event.preventDefault();
+    veil.classList.remove("over");
+    open(event.dataTransfer.files[0]);
+  });
+}
+
+function onContextLost(event) {
+  event.preventDefault();
+  showMessage({
+    title: "The graphics processor gave up",
+    text: "It ran out of memory or was reset. Load this page again, perhaps at a lower resolution.",
+    canOpen: false,
+  });
+}

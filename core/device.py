@@ -39,7 +39,6 @@ def usable_gpus() -> int:
     import torch
     import warp
 
-    from core.kernels.start import start_warp
+    import core.kernels  # noqa: F401  (starts Warp)
 
-    start_warp()
     return min(warp.get_cuda_device_count(), torch.cuda.device_count()) if torch.cuda.is_available() else 0

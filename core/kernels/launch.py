@@ -17,10 +17,6 @@ from typing import Any
 
 import warp as wp
 
-from core.kernels.start import start_warp
-
-start_warp()
-
 MAX_THREADS = 8
 RANGES_PER_THREAD = 4  # rays differ in cost: smaller ranges even the threads out
 CPU_ACCUMULATORS = 2

@@ -1,4 +1,4 @@
-"""Starting Warp without its chatter. Imported by launch.py before anything is launched."""
+"""Starting Warp without its chatter. The package does so when it is imported."""
 
 import os
 import sys

@@ -85,7 +85,7 @@ class Rasteriser:
         """Brings the vertices and their boxes into a camera's frame; its lens."""
         rotation = camera.world_from_camera[:3, :3]
         depths = (_corners(*self._bounds) - camera.position) @ -rotation[:, 2]
-        nearest, deepest = max(depths.min(), 0.0), max(depths.max(), 0.0)
+        nearest, deepest = max(float(depths.min()), 0.0), max(float(depths.max()), 0.0)
         lens = kernels.Lens()
         lens.focal, lens.centre = wp.vec2d(*camera.focal_px), wp.vec2d(*camera.centre_px)
         lens.width, lens.height = camera.size_px

@@ -5,7 +5,7 @@ Every other renderer (raster.py, the shaders) is tested against this one.
 Visibility is by homogeneous ray-triangle tests: with the camera at the origin, a ray direction d meets the plane of
 (v0, v1, v2) at t d, where t = det(v0, v1, v2) / (b0 + b1 + b2) and b0 = d.(v1 x v2), b1 = d.(v2 x v0),
 b2 = d.(v0 x v1) are proportional to the barycentric coordinates. The ray hits the triangle where the three have the
-same sign and t > 0. Nothing is projected, so nothing has to be clipped, and texture coordinates are perspective-correct.
+same sign and t > 0. Nothing is projected, so nothing has to be clipped, and interpolation is perspective-correct.
 """
 
 from collections.abc import Iterator
@@ -98,14 +98,14 @@ def _pixel_boxes(corners: np.ndarray, camera: Camera) -> Iterator[tuple[int, tup
     """
     width, height = camera.size_px
     depth = -corners[..., 2]
-    in_front = (depth > 0).all(-1)
+    in_front = np.all(depth > 0, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         x = camera.centre_px[0] + camera.focal_px[0] * corners[..., 0] / depth
         y = camera.centre_px[1] - camera.focal_px[1] * corners[..., 1] / depth
     # A pixel's centre is at + 0.5; the margin of a pixel either side keeps rounding out of the question.
     left, right = _pixel_range(x, in_front, width)
     top, bottom = _pixel_range(y, in_front, height)
-    visible = (depth > 0).any(-1) & (left < right) & (top < bottom)
+    visible = np.any(depth > 0, axis=-1) & (left < right) & (top < bottom)
     for index in np.flatnonzero(visible):
         yield int(index), (slice(top[index], bottom[index]), slice(left[index], right[index]))
 

@@ -89,8 +89,9 @@ class Rasteriser:
         lens = kernels.Lens()
         lens.focal, lens.centre = wp.vec2d(*camera.focal_px), wp.vec2d(*camera.centre_px)
         lens.width, lens.height = camera.size_px
-        lens.nearest = nearest
-        lens.depth_scale = kernels.DEPTH_STEPS / (deepest - nearest) if deepest > nearest else 0.0
+        lens.nearest = wp.float64(nearest)
+        steps_per_depth = kernels.DEPTH_STEPS / (deepest - nearest) if deepest > nearest else 0.0
+        lens.depth_scale = wp.float64(steps_per_depth)
         inputs = [self._positions, wp.vec3d(*camera.position), wp.mat33d(*rotation.T.ravel()), self._surface.vertices]
         launch(kernels.to_camera_frame, len(self._positions), inputs, self.device)
         launch(kernels.find_boxes, len(self._boxes), [self._surface, lens, self._boxes], self.device)

@@ -55,8 +55,8 @@ def evaluate(
 ) -> Evaluation:
     """Renders every view as the product shows it (deferred, 8 bit) and compares it with the photo.
 
-    Both are over the scene's background. `progress` is told the stage "measure", its own fraction (0 to 1: a caller with
-    more to do rescales it) and the mean PSNR so far.
+    Both are over the scene's background. `progress` is told the stage "measure", the fraction of the views (a caller
+    with more to do rescales it) and the mean PSNR so far.
     """
     rasteriser = Rasteriser(scene, device)
     scores: list[ViewScore] = []

@@ -1,6 +1,7 @@
 """How alike two images are. float64, data range 1."""
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from core.errors import ImageSizeMismatch
 
@@ -56,8 +57,7 @@ def _blurred(image: np.ndarray) -> np.ndarray:
     """The Gaussian mean at every position where the window fits."""
     for axis in (0, 1):
         weights = _window(min(SSIM_WINDOW_PX, image.shape[axis]))
-        count = image.shape[axis] - len(weights) + 1
-        image = sum(weight * image.take(range(offset, offset + count), axis) for offset, weight in enumerate(weights))  # type: ignore[assignment]
+        image = sliding_window_view(image, len(weights), axis) @ weights
     return image
 
 

@@ -36,10 +36,10 @@ class NeuralExtension {
     this.#parser = parser;
   }
 
-  // A neural material needs no fallback texture: decoding it would cost 64 MB per page. The loader may clone what is
+  // A neural primitive needs no fallback texture: decoding it would cost 64 MB per page. The loader may clone what is
   // returned here (meshes without normals), so the real material takes its place only at the end.
   loadMaterial(index) {
-    return this.#materialExtension(index) ? Promise.resolve(new MeshBasicMaterial()) : null;
+    return this.#onlyNeural(index) ? Promise.resolve(new MeshBasicMaterial()) : null;
   }
 
   async afterRoot(gltf) {
@@ -48,30 +48,33 @@ class NeuralExtension {
     gltf.neural = null;
     if (!root) return;
     const shaders = shadersOf(root.networks[0]);
-    const materials = new Map();
-    const parts = [];
-    for (const mesh of meshesOf(gltf.scene)) {
+    const parts = meshesOf(gltf.scene).map((mesh) => {
       const { meshes, primitives } = associations.get(mesh) ?? {};
-      const index = json.meshes[meshes]?.primitives[primitives ?? 0].material;
-      const extension = this.#materialExtension(index);
-      if (!extension) continue;
-      if (!materials.has(index)) materials.set(index, this.#readMaterial(extension, shaders));
-      // Straight to the parser's own method, past loadMaterial above.
-      parts.push({ mesh, material: await materials.get(index), loadFallback: () => this.#parser.loadMaterial(index) });
-    }
+      const primitive = json.meshes[meshes]?.primitives[primitives ?? 0];
+      return this.#readPart(mesh, primitive, shaders);
+    });
     const views = (root.views ?? []).map((view, i) => ({ ...view, name: nameOfView(json, view) || `View ${i + 1}` }));
-    if (parts.length > 0) gltf.neural = { parts, shaders, background: root.background ?? [1, 1, 1], views };
+    gltf.neural = { parts: await Promise.all(parts.filter(Boolean)), shaders, background: root.background ?? [1, 1, 1], views };
+    if (gltf.neural.parts.length === 0) gltf.neural = null;
   }
 
-  // The extension sits on the primitive (KHR_materials_unlit excludes others on its material); each page has a material
-  // of its own, so a material's index finds it.
-  #materialExtension(index) {
-    const primitives = (this.#parser.json.meshes ?? []).flatMap((mesh) => mesh.primitives);
-    return primitives.find((primitive) => primitive.material === index)?.extensions?.[EXTENSION];
+  #onlyNeural(material) {
+    const primitives = this.#parser.json.meshes.flatMap((mesh) => mesh.primitives);
+    const users = primitives.filter((primitive) => primitive.material === material);
+    return users.length > 0 && users.every((primitive) => primitive.extensions?.[EXTENSION]);
+  }
+
+  /** The part of a neural primitive, null of another. */
+  #readPart(mesh, primitive, shaders) {
+    const extension = primitive?.extensions?.[EXTENSION];
+    if (!extension) return null;
+    // Straight to the parser's own method, past loadMaterial above.
+    const loadFallback = () => this.#parser.loadMaterial(primitive.material);
+    return this.#readMaterial(extension, shaders).then((material) => ({ mesh, material, loadFallback }));
   }
 
   async #readMaterial({ network, coding, featureTextures }, shaders) {
-    if (network !== 0) throw new Error(`This viewer shows assets with one network, but a material uses number ${network}.`);
+    if (network !== 0) throw new Error(`This viewer shows assets with one network, but a mesh uses number ${network}.`);
     if (coding !== "unorm8") throw new Error(`This viewer reads features coded as "unorm8", but got "${coding}".`);
     const textures = await Promise.all(featureTextures.map(({ index }) => this.#readTexture(index)));
     return new NeuralMaterial(textures, shaders);

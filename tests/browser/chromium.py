@@ -1,0 +1,48 @@
+"""Starting a headless Chromium with, or without, WebGL2."""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from playwright.sync_api import Browser, sync_playwright
+
+THREE = Path(__file__).resolve().parents[2] / "viewer_static" / "node_modules" / "three"
+QUIET = (
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--mute-audio",
+)
+# Rendering in software: the same result on every machine.
+SOFTWARE_WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
+NO_WEBGL = ("--disable-gpu", "--disable-software-rasterizer", "--disable-3d-apis")
+
+
+def missing() -> str:
+    """What is missing for browser tests, with the remedy; empty when nothing is."""
+    if executable() is None:
+        return "no Chromium found (install the `chromium` package)"
+    if not THREE.is_dir():
+        return "three.js is not installed (run `npm ci` in viewer_static)"
+    return ""
+
+
+def executable() -> str | None:
+    """Path of the installed Chromium or Chrome."""
+    names = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+    return next((found for name in names if (found := shutil.which(name))), None)
+
+
+@contextmanager
+def running_browser(flags: tuple[str, ...] = SOFTWARE_WEBGL) -> Iterator[Browser]:
+    """A headless browser that ends with the block."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=executable(), args=[*QUIET, *flags])
+        try:
+            yield browser
+        finally:
+            browser.close()

@@ -1,0 +1,47 @@
+"""What a job offers for download. No other file of its folder is reachable."""
+
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.responses import FileResponse
+
+from service.errors import ArtifactNotFound
+from service.job_folder import JobFolder
+
+MEDIA_TYPES = {"scene.glb": "model/gltf-binary", "preview.png": "image/png", "report.json": "application/json"}
+
+
+def list_artifacts(folder: JobFolder) -> list[dict[str, Any]]:
+    """`name`, `bytes` and `url` of the artefacts that are there by now."""
+    found = []
+    for name in MEDIA_TYPES:
+        try:
+            size = (folder.artifacts / name).stat().st_size
+        except FileNotFoundError:
+            continue
+        found.append({"name": name, "bytes": size, "url": f"/jobs/{folder.id}/artifacts/{name}"})
+    return found
+
+
+def artifact_response(request: Request, folder: JobFolder, name: str) -> Response:
+    """The file, a range of it, or 304 where the client has it already.
+
+    Raises:
+        ArtifactNotFound
+    """
+    path = folder.artifacts / name
+    if name not in MEDIA_TYPES or not path.is_file():
+        remedy = f"One of {', '.join(MEDIA_TYPES)}; they are written when the job succeeds."
+        raise ArtifactNotFound(f"artifact {name[:64]!r}", "must exist", "no such file", remedy)
+    # The preview changes while a job runs, so a cache has to ask each time; the ETag makes asking cheap.
+    headers = {"Cache-Control": "no-cache", "X-Content-Type-Options": "nosniff"}
+    response = FileResponse(path, headers=headers, media_type=MEDIA_TYPES[name], stat_result=path.stat())
+    if _matches(request.headers.get("if-none-match", ""), response.headers["etag"]):
+        return Response(status_code=304, headers=headers | {"ETag": response.headers["etag"]})
+    return response
+
+
+def _matches(if_none_match: str, etag: str) -> bool:
+    """RFC 9110 section 13.1.2, with the weak comparison."""
+    asked = [tag.strip().removeprefix("W/") for tag in if_none_match.split(",")]
+    return "*" in asked or etag in asked

@@ -1,0 +1,52 @@
+"""Arguments that several commands share."""
+
+import argparse
+from pathlib import Path
+
+from service.options import Options
+from service.settings import ServiceSettings
+
+# Documented here and in the API's form alike; the defaults live in Options.
+CHOICES = {
+    "preset": "draft, balanced or high",
+    "device": "auto, cpu, cuda or cuda:N",
+    "seed": "of everything random",
+    "downscale": "reduce the photos by this whole factor",
+    "max-size-px": "reduce the photos to this longest side at most",
+    "background": "white, black or #rrggbb, behind transparent pixels",
+}
+
+
+def add_options(parser: argparse.ArgumentParser, **defaults: str) -> None:
+    """Adds what may be chosen for a conversion."""
+    for name, text in CHOICES.items():
+        parser.add_argument(f"--{name}", help=text, default=defaults.get(name, ""))
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="a setting of the preset")
+
+
+def form_words(arguments: argparse.Namespace) -> dict[str, str]:
+    """The choices as the API's form fields."""
+    chosen = {name.replace("-", "_"): getattr(arguments, name.replace("-", "_")) for name in CHOICES}
+    return {name: text for name, text in chosen.items() if text}
+
+
+def options_of(arguments: argparse.Namespace) -> Options:
+    """The choices, checked.
+
+    Raises:
+        UnknownPreset, OptionInvalid
+    """
+    return Options.from_text(form_words(arguments), arguments.set)
+
+
+def add_service(parser: argparse.ArgumentParser) -> None:
+    """Adds what the server and its workers must agree on."""
+    parser.add_argument("--data", type=Path, default=Path("data"), help="folder of everything that is written")
+    parser.add_argument(
+        "--database-url", default="", help="of the job engine; default: an SQLite file in the data folder"
+    )
+
+
+def settings_of(arguments: argparse.Namespace, worker_id: str = "") -> ServiceSettings:
+    named = {"worker_id": worker_id} if worker_id else {}
+    return ServiceSettings(data=arguments.data, database_url=arguments.database_url, **named)

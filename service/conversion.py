@@ -1,0 +1,133 @@
+"""The whole path: photos -> capture -> scene -> scene.glb, read again and measured."""
+
+import math
+import shutil
+import time
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from core.baked import BakedScene
+from core.capture import WHITE, Capture, View
+from core.datasets import read_capture
+from core.device import resolve_device
+from core.evaluation import Evaluation, evaluate
+from core.presets import settings_for
+from core.progress import ProgressCallback, ignore_progress
+from core.reconstruct import reconstruct
+from core.render.raster import Rasteriser
+from exporters.gltf import read_glb, write_glb
+from service.atomic import write_atomically
+from service.capture_source import opened_capture
+from service.preview import over_background, png_bytes
+from service.report import Figure, Report
+from service.stages import EXPORT, MEASURE, READ, TRAIN, Stages
+
+SCENE, PREVIEW, REPORT = "scene.glb", "preview.png", "report.json"
+NO_HELD_OUT = "No view is held out, so the quality was not measured."
+
+
+def convert(
+    capture_path: Path,
+    out_dir: Path,
+    *,
+    preset: str = "balanced",
+    device: str = "auto",
+    seed: int = 0,
+    overrides: Mapping[str, Any] | None = None,
+    downscale: int = 1,
+    max_size_px: int | None = None,
+    background: tuple[float, float, float] = WHITE,
+    progress: ProgressCallback = ignore_progress,
+    checkpoint_dir: Path | None = None,
+) -> Report:
+    """Turns a capture into `scene.glb`, `preview.png` and `report.json` in `out_dir`.
+
+    Every figure is measured on the scene.glb as written, read again: never on the trainer. Each file appears whole or
+    not at all, the report last.
+
+    Args:
+        capture_path: a folder, a pose file or a .zip of a capture.
+        out_dir: made when missing.
+        preset, overrides: see core.presets.
+        device: auto, cpu, cuda or cuda:N.
+        downscale, max_size_px, background: see `read_capture`.
+        progress: is told stage and fraction of the whole, and now and then a preview.
+        checkpoint_dir: kept up to date while training; a conversion that was stopped goes on from there. Removed on
+            success.
+
+    Raises:
+        InputError: the capture or an option cannot be used.
+        TrainingFailed
+    """
+    stages = Stages(progress)
+    started = time.perf_counter()
+    settings = settings_for(preset, **(overrides or {}))
+    device = resolve_device(device)
+    with stages.stage("read", READ), opened_capture(capture_path) as source:
+        capture = read_capture(source, max_size_px=max_size_px, downscale=downscale, background=background)
+
+    trained = reconstruct(
+        capture,
+        settings,
+        device=device,
+        seed=seed,
+        checkpoint_dir=checkpoint_dir,
+        progress=stages.within(TRAIN),
+    )
+    stages.add(trained.seconds)
+    with stages.stage("export", EXPORT):
+        out_dir.mkdir(parents=True, exist_ok=True)
+        sizes = _write(out_dir, write_glb(trained.scene))
+        scene = read_glb((out_dir / SCENE).read_bytes())
+    with stages.stage("measure", MEASURE):
+        evaluation = evaluate(scene, capture.test, device) if capture.test else None
+        sizes |= _write(out_dir, {PREVIEW: png_bytes(_picture(scene, capture, device))})
+
+    report = Report(
+        psnr=_figure(evaluation, "psnr"),
+        ssim=_figure(evaluation, "ssim"),
+        seconds=_rounded(stages.seconds | {"total": time.perf_counter() - started}),
+        bytes=sizes,
+        quads=scene.quad_count,
+        triangles=scene.triangle_count,
+        pages=len(scene.pages),
+        settings=asdict(settings)
+        | {"seed": seed, "downscale": downscale, "max_size_px": max_size_px, "background": list(background)},
+        device=device,
+        views={"train": len(capture.train), "test": len(capture.test)},
+        notes=capture.notes + (() if evaluation else (NO_HELD_OUT,)),
+    )
+    _write(out_dir, {REPORT: report.as_bytes()})
+    if checkpoint_dir:
+        shutil.rmtree(checkpoint_dir, ignore_errors=True)
+    stages.report("measure", 1.0, psnr=report.psnr.mean)
+    return report
+
+
+def _write(folder: Path, files: Mapping[str, bytes]) -> dict[str, int]:
+    for name, data in files.items():
+        write_atomically(folder / name, data)
+    return {name: len(data) for name, data in files.items()}
+
+
+def _picture(scene: BakedScene, capture: Capture, device: str) -> Any:
+    """The scene from the held-out view, else the training view, that shows most of it: [h, w, 3] uint8."""
+    view = max(capture.test or capture.train, key=_shown)
+    return over_background(Rasteriser(scene, device).deferred(view.camera), capture.background)
+
+
+def _shown(view: View) -> float:
+    return float(view.premultiplied()[1].mean())
+
+
+def _figure(evaluation: Evaluation | None, name: str) -> Figure:
+    if evaluation is None:
+        return Figure(None, {})
+    per_view = {view.name: getattr(view, name) for view in evaluation.views}
+    return Figure(getattr(evaluation, name), per_view)
+
+
+def _rounded(seconds: Mapping[str, float]) -> dict[str, float]:
+    return {stage: round(value, 3) for stage, value in seconds.items() if math.isfinite(value)}

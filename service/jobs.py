@@ -1,0 +1,173 @@
+"""Jobs as the API sees them: a row of the job engine and a folder."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import aclosing
+from datetime import UTC, datetime
+from typing import Any
+
+from dbos import DBOSClient, WorkflowSerializationFormat, WorkflowStatus
+
+from service.artifacts import list_artifacts
+from service.database import APPLICATION, PROGRESS_STREAM, QUEUE, WORKFLOW
+from service.errors import JobBusy, JobInterrupted, JobNotFound
+from service.job_folder import JOB_ID, JobFolder
+from service.problems import problem_of
+from service.settings import ServiceSettings
+
+STATES = {
+    "DELAYED": "queued",
+    "ENQUEUED": "queued",
+    "PENDING": "running",
+    "SUCCESS": "succeeded",
+    "ERROR": "failed",
+    "MAX_RECOVERY_ATTEMPTS_EXCEEDED": "failed",
+    "CANCELLED": "cancelled",
+}
+NO_PROGRESS: dict[str, Any] = {"stage": None, "fraction": 0.0, "psnr": None, "preview": False}
+ENDED = ("succeeded", "failed", "cancelled")
+# A worker looks once a second whether its job was cancelled; ten times that means it hangs.
+RELEASE_TIMEOUT_S = 10.0
+
+
+class Jobs:
+    """The job engine's client. It never runs a job; workers do."""
+
+    def __init__(self, settings: ServiceSettings) -> None:
+        self._settings = settings
+        self._client = DBOSClient(system_database_url=settings.database_url, application_name=APPLICATION)
+
+    def close(self) -> None:
+        self._client.destroy()
+
+    async def enqueue(self, folder: JobFolder) -> None:
+        """Hands a new job to the workers. Only its id goes through the engine."""
+        portable = WorkflowSerializationFormat.PORTABLE
+        await self._client.enqueue_async(
+            {
+                "workflow_name": WORKFLOW,
+                "queue_name": QUEUE,
+                "workflow_id": folder.id,
+                "application_name": APPLICATION,
+                "serialization_type": portable,
+            },
+            folder.id,
+        )
+
+    async def list(self, limit: int = 200) -> list[dict[str, Any]]:
+        """The newest jobs first."""
+        rows = await self._client.list_workflows_async(name=WORKFLOW, sort_desc=True, limit=limit, load_input=False)
+        return await asyncio.to_thread(lambda: [self._view(row) for row in rows])
+
+    async def get(self, job_id: str) -> dict[str, Any]:
+        """One job.
+
+        Raises:
+            JobNotFound
+        """
+        row = await self._row(job_id)
+        return await asyncio.to_thread(self._view, row)
+
+    async def cancel(self, job_id: str) -> dict[str, Any]:
+        """Stops a job; one that has ended stays as it is. Returns when its trainer is gone: within about a second.
+
+        Raises:
+            JobNotFound
+            JobBusy: its trainer does not end.
+        """
+        if (await self.get(job_id))["state"] not in ENDED:
+            await self._client.cancel_workflow_async(job_id)
+            await asyncio.to_thread(_when_released, self._folder(job_id), JobFolder.drop_inputs)
+        return await self.get(job_id)
+
+    async def delete(self, job_id: str) -> None:
+        """Stops a job and removes everything of it.
+
+        Raises:
+            JobNotFound
+            JobBusy: its trainer does not end.
+        """
+        await self.cancel(job_id)
+        # The row goes last: a worker learns from it that its job is cancelled.
+        await asyncio.to_thread(_when_released, self._folder(job_id), JobFolder.remove)
+        await self._client.delete_workflow_async(job_id)
+
+    async def reports(self, job_id: str, after: int = 0) -> AsyncIterator[tuple[int, dict[str, Any]]]:
+        """The job's reports from number `after` + 1 on, as they come, with their numbers; ends with the job."""
+        stream = self._client.read_stream_async(job_id, PROGRESS_STREAM, offset=after, polling_interval_sec=0.5)
+        async with aclosing(stream):  # type: ignore[type-var]
+            async for report in stream:
+                after += 1
+                yield after, report
+
+    def folder(self, job_id: str) -> JobFolder:
+        """The folder of an id that may be wrong.
+
+        Raises:
+            JobNotFound
+        """
+        folder = self._folder(job_id)
+        if not folder.path.is_dir():
+            raise _unknown(job_id)
+        return folder
+
+    def _folder(self, job_id: str) -> JobFolder:
+        if not JOB_ID.fullmatch(job_id):
+            raise _unknown(job_id)
+        return JobFolder(self._settings.jobs / job_id)
+
+    async def _row(self, job_id: str) -> WorkflowStatus:
+        self._folder(job_id)
+        rows = await self._client.list_workflows_async(workflow_ids=[job_id], load_input=False)
+        if not rows:
+            raise _unknown(job_id)
+        return rows[0]
+
+    def _view(self, row: WorkflowStatus) -> dict[str, Any]:
+        folder = self._folder(row.workflow_id)
+        request = folder.request()
+        problem = _problem(row)
+        return {
+            "id": folder.id,
+            "name": request.get("name", ""),
+            "state": "failed" if problem else STATES[row.status],
+            "created": _time_text(row.created_at),
+            "started": _time_text(row.dequeued_at),
+            "ended": _time_text(row.completed_at),
+            "options": request.get("options", {}),
+            **(folder.progress() or NO_PROGRESS),
+            "problem": problem,
+            "artifacts": list_artifacts(folder),
+        }
+
+
+def _problem(row: WorkflowStatus) -> dict[str, Any] | None:
+    """Why the job failed: what its trainer refused, else that it never came to an end."""
+    if row.status == "SUCCESS":
+        return (row.output or {}).get("problem")
+    if STATES[row.status] != "failed":
+        return None
+    rule = "must reach its end"
+    received = "a trainer that crashed or hung at each attempt"
+    remedy = "See trainer.log in the job's folder; a smaller preset or more downscaling needs less memory."
+    return problem_of(JobInterrupted("job", rule, received, remedy))
+
+
+def _when_released(folder: JobFolder, act: Callable[[JobFolder], None]) -> None:
+    try:
+        with folder.lock(RELEASE_TIMEOUT_S):
+            act(folder)
+    except FileNotFoundError:
+        pass
+    except BlockingIOError:
+        raise JobBusy(f"job {folder.id}", "must be let go by its worker", "", "Try again in a minute.") from None
+
+
+def _unknown(job_id: str) -> JobNotFound:
+    return JobNotFound(f"job {job_id[:64]!r}", "must exist", "no such job", "GET /jobs lists them.")
+
+
+def _time_text(milliseconds: int | None) -> str | None:
+    if milliseconds is None:
+        return None
+    return datetime.fromtimestamp(milliseconds / 1e3, UTC).isoformat(timespec="milliseconds")

@@ -1,0 +1,106 @@
+"""What a person may choose for a conversion; the same words in the API's form and on the command line."""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from core.capture import WHITE
+from core.errors import OptionInvalid
+from core.presets import settings_for
+
+DEVICE = re.compile(r"auto|cpu|cuda(:\d+)?")
+MAX_DOWNSCALE = 16
+SIZE_RANGE_PX = (16, 20_000)
+MAX_SEED = 2**31 - 1
+WHOLE_NUMBERS = ("seed", "downscale", "max_size_px")
+NAMED_BACKGROUNDS = {"white": WHITE, "black": (0.0, 0.0, 0.0)}
+
+
+@dataclass(frozen=True)
+class Options:
+    """The choices of one conversion, checked when built.
+
+    Attributes:
+        preset: draft, balanced or high.
+        device: auto, cpu, cuda or cuda:N.
+        seed: of everything random, 0 to 2^31 - 1.
+        downscale: photos are reduced by this whole factor, 1 to 16.
+        max_size_px: photos are reduced to this longest side at most, 16 to 20000; None for no bound.
+        background: sRGB in [0, 1], behind the transparent pixels of photos.
+        overrides: settings that replace the preset's.
+
+    Raises:
+        UnknownPreset, OptionInvalid
+    """
+
+    preset: str = "balanced"
+    device: str = "auto"
+    seed: int = 0
+    downscale: int = 1
+    max_size_px: int | None = None
+    background: tuple[float, float, float] = WHITE
+    overrides: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        settings_for(self.preset, **self.overrides)
+        if not DEVICE.fullmatch(self.device):
+            raise OptionInvalid("device", "must be auto, cpu, cuda or cuda:N", repr(self.device))
+        _require_between("seed", self.seed, 0, MAX_SEED)
+        _require_between("downscale", self.downscale, 1, MAX_DOWNSCALE)
+        if self.max_size_px is not None:
+            _require_between("max_size_px", self.max_size_px, *SIZE_RANGE_PX)
+
+    @classmethod
+    def from_text(cls, words: Mapping[str, str], assignments: Sequence[str] = ()) -> "Options":
+        """Options from the words of a form or a command line; what is absent or empty keeps its default.
+
+        Args:
+            words: any of preset, device, seed, downscale, max_size_px, background ("white", "black", "#rrggbb").
+            assignments: settings that replace the preset's, as "name=value".
+        """
+        chosen: dict[str, Any] = {name: words[name] for name in ("preset", "device") if words.get(name)}
+        chosen |= {name: _whole(name, words[name]) for name in WHOLE_NUMBERS if words.get(name)}
+        if words.get("background"):
+            chosen["background"] = _color(words["background"])
+        return cls(**chosen, overrides=dict(_assignment(text) for text in assignments))
+
+    @classmethod
+    def from_json(cls, value: Mapping[str, Any]) -> "Options":
+        """The reverse of `as_json`."""
+        return cls(**{**value, "background": tuple(value["background"])})
+
+    def as_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def _require_between(name: str, value: int, low: int, high: int) -> None:
+    if not low <= value <= high:
+        raise OptionInvalid(name, f"must lie between {low} and {high}", str(value))
+
+
+def _whole(name: str, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise OptionInvalid(name, "must be a whole number", repr(text[:40])) from None
+
+
+def _color(text: str) -> tuple[float, float, float]:
+    if text in NAMED_BACKGROUNDS:
+        return NAMED_BACKGROUNDS[text]
+    if not re.fullmatch(r"#[0-9a-fA-F]{6}", text):
+        raise OptionInvalid("background", "must be white, black or #rrggbb", repr(text[:40]))
+    red, green, blue = (int(text[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+    return red, green, blue
+
+
+def _assignment(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not equals or not name.isidentifier():
+        raise OptionInvalid("setting", "must be written name=value", repr(text[:80]))
+    try:
+        return name, json.loads(value)
+    except ValueError:
+        return name, value  # a plain word needs no quotes

@@ -1,0 +1,53 @@
+"""The workflow that the job engine runs for a job: one step, the trainer."""
+
+import asyncio
+import logging
+from typing import Any
+
+from dbos import DBOS, WorkflowSerializationFormat
+
+from service.database import PROGRESS_STREAM, WORKFLOW
+from service.job_folder import JobFolder
+from service.settings import ServiceSettings
+from service.trainer_process import run_trainer
+
+# Each dispatch counts, also those after an orderly restart of the worker.
+MAX_RECOVERIES = 20
+MAX_ATTEMPTS = 3
+
+log = logging.getLogger(__name__)
+
+
+def register_pipeline(settings: ServiceSettings) -> None:
+    """Tells the job engine the workflow; before its launch, once in a process."""
+
+    async def publish(folder: JobFolder, report: dict[str, Any]) -> None:
+        await asyncio.to_thread(folder.write_progress, report)
+        # This write also fences: it fails for a worker whose job was given to another.
+        await DBOS.write_stream_async(PROGRESS_STREAM, report)
+
+    # Only an async step can be cancelled midway. It returns plain values, because the engine pickles them.
+    @DBOS.step(name="train", preemptible=True, retries_allowed=True, max_attempts=MAX_ATTEMPTS)
+    async def train(job_id: str) -> dict[str, Any] | None:
+        folder = JobFolder(settings.jobs / job_id)
+        try:
+            problem = await run_trainer(
+                settings.trainer, folder, lambda report: publish(folder, report), settings.stall_s
+            )
+        except Exception as error:
+            log.warning("job %s: %s", job_id, error)
+            raise
+        if problem:
+            folder.drop_inputs()
+        else:
+            folder.drop_checkpoint()
+        return problem
+
+    @DBOS.workflow(
+        name=WORKFLOW,
+        max_recovery_attempts=MAX_RECOVERIES,
+        serialization_type=WorkflowSerializationFormat.PORTABLE,
+    )
+    async def convert(job_id: str) -> dict[str, Any]:
+        """The outcome: `{"problem": {...} or None}`. A refusal is a result; only a crash is an error."""
+        return {"problem": await train(job_id)}

@@ -1,0 +1,101 @@
+"""The endpoints."""
+
+from typing import Any
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import JSONResponse, StreamingResponse
+
+from service.artifacts import artifact_response
+from service.events import job_events, last_event_id
+from service.jobs import Jobs
+from service.problems import MEDIA_TYPE as PROBLEM
+from service.uploads import receive_job
+
+FORM = {
+    "type": "object",
+    "required": ["files"],
+    "properties": {
+        "files": {
+            "type": "array",
+            "items": {"type": "string", "format": "binary"},
+            "description": "Photos and pose files, named relative to the capture (train/r_0.png), or one .zip of them.",
+        },
+        "name": {"type": "string"},
+        "preset": {"type": "string", "default": "balanced"},
+        "device": {"type": "string", "default": "auto", "description": "auto, cpu, cuda or cuda:N"},
+        "seed": {"type": "integer", "default": 0},
+        "downscale": {"type": "integer", "default": 1, "minimum": 1, "maximum": 16},
+        "max_size_px": {"type": "integer", "description": "longest side of a photo at most"},
+        "background": {"type": "string", "default": "white", "description": "white, black or #rrggbb"},
+        "set": {"type": "array", "items": {"type": "string"}, "description": "name=value, a setting of the preset"},
+    },
+}
+UPLOAD = {"requestBody": {"required": True, "content": {"multipart/form-data": {"schema": FORM}}}}
+
+router = APIRouter(
+    responses={"4XX": {"description": "A problem (RFC 9457) with a stable code", "content": {PROBLEM: {}}}}
+)
+
+
+def _jobs(request: Request) -> Jobs:
+    return request.app.state.jobs
+
+
+@router.get("/health")
+async def health() -> dict[str, str]:
+    """Whether the server answers."""
+    return {"status": "ok"}
+
+
+@router.post("/jobs", status_code=202, openapi_extra=UPLOAD)
+async def create_job(request: Request) -> JSONResponse:
+    """Starts a conversion. What can be refused without decoding a photo is refused at once."""
+    jobs = _jobs(request)
+    folder = await receive_job(request, request.app.state.settings)
+    try:
+        await jobs.enqueue(folder)
+    except BaseException:
+        folder.remove()
+        raise
+    return JSONResponse(await jobs.get(folder.id), 202, headers={"Location": f"/jobs/{folder.id}"})
+
+
+@router.get("/jobs")
+async def list_jobs(request: Request) -> dict[str, Any]:
+    """The newest 200 jobs."""
+    return {"jobs": await _jobs(request).list()}
+
+
+@router.get("/jobs/{job_id}")
+async def get_job(request: Request, job_id: str) -> dict[str, Any]:
+    """A job: its state, latest progress, artefacts and, where it failed, the problem."""
+    return await _jobs(request).get(job_id)
+
+
+@router.get("/jobs/{job_id}/events", response_class=StreamingResponse)
+async def get_job_events(request: Request, job_id: str) -> StreamingResponse:
+    """Server-sent events: every report from the first, or after `Last-Event-ID`, then `end`."""
+    jobs = _jobs(request)
+    await jobs.get(job_id)
+    after = last_event_id(request.headers.get("last-event-id"))
+    headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
+    return StreamingResponse(job_events(jobs, job_id, after), headers=headers, media_type="text/event-stream")
+
+
+@router.post("/jobs/{job_id}/cancel")
+async def cancel_job(request: Request, job_id: str) -> dict[str, Any]:
+    """Stops a job. One that has ended stays as it is."""
+    return await _jobs(request).cancel(job_id)
+
+
+@router.delete("/jobs/{job_id}", status_code=204)
+async def delete_job(request: Request, job_id: str) -> Response:
+    """Stops a job and removes its files and its record."""
+    await _jobs(request).delete(job_id)
+    return Response(status_code=204)
+
+
+@router.api_route("/jobs/{job_id}/artifacts/{name}", methods=["GET", "HEAD"])
+async def get_artifact(request: Request, job_id: str, name: str) -> Response:
+    """`scene.glb`, `preview.png` or `report.json`; ranges and ETags are honoured."""
+    return artifact_response(request, _jobs(request).folder(job_id), name)

@@ -1,0 +1,61 @@
+"""Where a conversion stands, over all its stages."""
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+
+from core.progress import Progress, ProgressCallback
+
+# The share of the whole that each stage takes, from its start to its end; training is nearly all of it.
+READ = (0.0, 0.02)
+TRAIN = (0.02, 0.95)
+EXPORT = (0.95, 0.97)
+MEASURE = (0.97, 1.0)
+
+
+class Stages:
+    """Times the stages and turns their own fractions into those of the whole, which never fall.
+
+    Attributes:
+        seconds: of each stage that has ended, wall clock.
+    """
+
+    def __init__(self, callback: ProgressCallback) -> None:
+        self._callback = callback
+        self._fraction = 0.0
+        self._psnr: float | None = None
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def stage(self, name: str, span: tuple[float, float]) -> Iterator[None]:
+        """Reports the stage's start, and times it."""
+        self.report(name, span[0])
+        started = time.perf_counter()
+        yield
+        self.seconds[name] = time.perf_counter() - started
+
+    def add(self, seconds: Mapping[str, float]) -> None:
+        """Takes over what a part timed itself."""
+        self.seconds |= seconds
+
+    def within(self, span: tuple[float, float]) -> ProgressCallback:
+        """A callback for a part of the work that reports its own fraction, 0 to 1."""
+
+        def inner(report: Progress) -> None:
+            self._send(replace(report, fraction=span[0] + (span[1] - span[0]) * report.fraction))
+
+        return inner
+
+    def report(
+        self, stage: str, fraction: float, *, psnr: float | None = None, preview_u8: np.ndarray | None = None
+    ) -> None:
+        """Reports a fraction of the whole."""
+        self._send(Progress(stage, fraction, psnr, preview_u8))
+
+    def _send(self, report: Progress) -> None:
+        self._fraction = min(1.0, max(self._fraction, report.fraction))
+        self._psnr = report.psnr if report.psnr is not None else self._psnr
+        self._callback(replace(report, fraction=self._fraction, psnr=self._psnr))

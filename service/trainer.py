@@ -1,0 +1,81 @@
+"""Runs one job: `python -m service.trainer JOB_FOLDER --parent PID`. See trainer_process for what it writes."""
+
+import argparse
+import json
+import logging
+import os
+import sys
+from pathlib import Path
+from typing import IO, Any
+
+from core.errors import InputError, PolyfieldError
+from core.progress import Progress
+from service.atomic import write_atomically
+from service.conversion import convert
+from service.job_folder import JobFolder
+from service.options import Options
+from service.parent import end_with_parent
+from service.preview import png_bytes
+from service.problems import problem_of
+from service.trainer_process import EXIT_FAILED, EXIT_REFUSED
+
+# Training takes every core for minutes; the server has to be faster than that to answer.
+NICENESS = 10
+
+
+def main() -> int:
+    arguments = _arguments()
+    end_with_parent(arguments.parent)
+    os.nice(NICENESS)
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr)
+    channel = _claim_stdout()
+    folder = JobFolder(arguments.folder)
+    try:
+        _run(folder, channel)
+    except PolyfieldError as error:
+        _send(channel, problem=problem_of(error))
+        logging.exception("refused" if isinstance(error, InputError) else "failed")
+        return EXIT_REFUSED if isinstance(error, InputError) else EXIT_FAILED
+    return 0
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="service.trainer")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--parent", type=int, required=True)
+    return parser.parse_args()
+
+
+def _run(folder: JobFolder, channel: IO[str]) -> None:
+    options = Options.from_json(folder.request()["options"])
+    preview = folder.artifacts / "preview.png"
+
+    def progress(report: Progress) -> None:
+        if report.preview_u8 is not None:
+            write_atomically(preview, png_bytes(report.preview_u8))
+        numbers = {"stage": report.stage, "fraction": report.fraction, "psnr": report.psnr}
+        _send(channel, report=numbers | {"preview": preview.exists()})
+
+    convert(
+        folder.capture,
+        folder.artifacts,
+        **options.as_json(),
+        progress=progress,
+        checkpoint_dir=folder.checkpoint,
+    )
+
+
+def _claim_stdout() -> IO[str]:
+    """The pipe to the worker. Whatever else prints, native libraries included, goes to the log from here on."""
+    channel = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    return channel
+
+
+def _send(channel: IO[str], **message: Any) -> None:
+    channel.write(json.dumps(message) + "\n")
+    channel.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,74 @@
+"""Uploads: received into a folder of their own, checked there, and only then made a job."""
+
+import asyncio
+import shutil
+import time
+import uuid
+from pathlib import Path
+
+from fastapi import Request
+
+from core.datasets import check_capture
+from core.errors import NoImages, UploadTooLarge
+from service.archive import extract
+from service.errors import RequestInvalid
+from service.form import SHRINK, Form, receive_form
+from service.job_folder import JobFolder
+from service.options import Options
+from service.settings import Limits, ServiceSettings
+
+SETTING_FIELD = "set"
+
+
+async def receive_job(request: Request, settings: ServiceSettings) -> JobFolder:
+    """Reads a `POST /jobs` and returns the new job's folder, complete with its job.json.
+
+    Whatever is wrong, nothing of the upload stays on disk.
+
+    Raises:
+        InputError: of the form, an option, the archive or the capture.
+    """
+    _refuse_announced(request, settings.limits)
+    job_id = uuid.uuid4().hex
+    staging = settings.incoming / job_id
+    try:
+        received = staging / "received"
+        received.mkdir(parents=True)
+        content_type = request.headers.get("content-type", "")
+        form = await receive_form(content_type, request.stream(), received, settings.limits)
+        options = Options.from_text(form.words(), form.fields.get(SETTING_FIELD, ()))
+        folder = JobFolder(staging)
+        await asyncio.to_thread(_make_capture, form, received, folder, settings.limits)
+        folder.write_request(_request_of(job_id, form, options))
+        folder.artifacts.mkdir()
+        staging.rename(settings.jobs / job_id)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+    return JobFolder(settings.jobs / job_id)
+
+
+def _refuse_announced(request: Request, limits: Limits) -> None:
+    announced = request.headers.get("content-length", "")
+    if announced.isdecimal() and int(announced) > limits.upload_bytes:
+        raise UploadTooLarge("upload", f"at most {limits.upload_bytes} bytes", announced, SHRINK)
+
+
+def _make_capture(form: Form, received: Path, folder: JobFolder, limits: Limits) -> None:
+    if not form.files:
+        remedy = "Send the photos with their pose file, or one .zip of both."
+        raise NoImages("upload", "must hold photos", "no file", remedy)
+    archives = [path for path in form.files if path.suffix.lower() == ".zip"]
+    if not archives:
+        received.rename(folder.capture)
+    elif len(form.files) == 1:
+        folder.capture.mkdir()
+        extract(received / archives[0], folder.capture, limits)
+        shutil.rmtree(received)
+    else:
+        raise RequestInvalid("upload", "must be one .zip or loose files", "both", "Send one of them.")
+    check_capture(folder.capture)
+
+
+def _request_of(job_id: str, form: Form, options: Options) -> dict[str, object]:
+    name = form.words().get("name") or form.files[0].parts[0].removesuffix(".zip")
+    return {"id": job_id, "name": name[:200], "created_at": time.time(), "options": options.as_json()}

@@ -310,10 +310,11 @@ def shade(
         triangle = triangle_of(keys[y * lens.width + x])
         if triangle >= 0:
             hit = intersect(surface, triangle, sample_ray(lens, x, first_row + y))
-            texel = surface.texels[hit.texel]
-            for channel in range(8):
-                total[channel] += float((texel >> wp.uint64(8 * channel)) & wp.uint64(255)) / 255.0
-            covered += 1.0
+            if hit.texel >= 0:  # it was when drawn; the compiler may have fused the arithmetic differently there
+                texel = surface.texels[hit.texel]
+                for channel in range(8):
+                    total[channel] += float((texel >> wp.uint64(8 * channel)) & wp.uint64(255)) / 255.0
+                covered += 1.0
     pixel = wp.vec4f()
     if covered > 0.0:
         direction = wp.normalize(world_from_camera * pixel_ray(lens, side, column, first_row / side + row))

@@ -1,5 +1,5 @@
-// All of it highp. Positions, texture coordinates on 4096 texels and window coordinates need it; the network too: in half
-// precision its products lose up to two decimal digits, and large weights overflow.
+// All of it highp. Positions, texture coordinates on 4096 texels and window coordinates need it. The network does too:
+// in half precision its error grows with the weights, which are whatever training made of them.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

@@ -1,8 +1,8 @@
 """instant-ngp and nerfstudio captures: transforms.json with intrinsics and OpenCV distortion, shared or per frame.
 
 Poses are camera-to-world with OpenGL axes, as ours. A split that the file states (`train_filenames`, `test_filenames`
-or `val_filenames`) is used. `aabb_scale` and `applied_transform` do not matter: the capture's own frame is kept. Masks and
-depth maps are not read.
+or `val_filenames`) is used. `aabb_scale` and `applied_transform` do not matter: the capture keeps its own frame. Masks
+and depth maps are not read.
 """
 
 from __future__ import annotations

@@ -10,15 +10,19 @@ const HIDDEN = /(^|\/)(\.|__MACOSX\/|Thumbs\.db$)/;
 export class FileSelection {
   /** @type {Map<string, Picked>} by path; a file picked twice counts once */
   #files = new Map();
+  /** What the capture may be called: its folder's or archive's name; "" for loose files. */
+  suggestedName = "";
 
   /** @param {Picked[]} picked */
   add(picked) {
     const useful = picked.filter(({ path }) => !HIDDEN.test(path) && kindOf(path) !== "other");
+    this.suggestedName ||= nameOf(useful);
     for (const item of withoutFolderName(useful)) this.#files.set(item.path, item);
   }
 
   clear() {
     this.#files.clear();
+    this.suggestedName = "";
   }
 
   get files() {
@@ -72,6 +76,13 @@ async function readAll(reader) {
     if (batch.length === 0) return all;
     all.push(...batch);
   }
+}
+
+function nameOf(picked) {
+  const [first] = picked;
+  if (!first) return "";
+  if (kindOf(first.path) === "archive") return first.file.name.replace(ARCHIVE, "");
+  return first.path.includes("/") ? first.path.split("/")[0] : "";
 }
 
 // Pose files name photos relative to themselves, so a picked folder that holds the pose file loses its own name.

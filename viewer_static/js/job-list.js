@@ -1,7 +1,7 @@
 // The list of jobs: newest first, running ones live.
 
-import { cancelJob, deleteJob, getJob, listJobs } from "./api.js";
-import { plural } from "./format.js";
+import { cancelJob, deleteJob, listJobs } from "./api.js";
+import { formatCount } from "./format.js";
 import { JobCard } from "./job-card.js";
 import { followJob } from "./job-events.js";
 import { showProblem } from "./notice.js";
@@ -13,6 +13,10 @@ const MAX_FOLLOWED = 3;
 export class JobList {
   #cards = new Map();
   #followed = new Map();
+  #actions = {
+    onCancel: (id) => this.#act(() => cancelJob(id)),
+    onDelete: (id) => this.#act(() => deleteJob(id)),
+  };
   #element = document.getElementById("jobs");
   #offline = document.getElementById("jobs-offline");
 
@@ -37,7 +41,7 @@ export class JobList {
     for (const id of [...this.#cards.keys()].filter((id) => !ids.has(id))) this.#remove(id);
     newestFirst.forEach((job, index) => this.#place(job, index));
     document.getElementById("jobs-empty").hidden = jobs.length > 0;
-    document.getElementById("jobs-count").textContent = jobs.length > 0 ? plural(jobs.length, "asset") : "";
+    document.getElementById("jobs-count").textContent = jobs.length > 0 ? formatCount(jobs.length) : "";
     this.#follow();
   }
 
@@ -45,7 +49,7 @@ export class JobList {
     const card = this.#cards.get(job.id);
     // Events of a running job are fresher than the list.
     if (card) card.update(this.#followed.has(job.id) ? { ...job, ...progressOf(card.job, job) } : job);
-    else this.#cards.set(job.id, new JobCard(job, { onCancel: (id) => this.#cancel(id), onDelete: (id) => this.#delete(id) }));
+    else this.#cards.set(job.id, new JobCard(job, this.#actions));
     const { element } = this.#cards.get(job.id);
     if (this.#element.children[index] !== element) this.#element.insertBefore(element, this.#element.children[index]);
   }
@@ -61,10 +65,15 @@ export class JobList {
       const running = card.job.state === "running";
       if (!running) this.#unfollow(id);
       else if (!this.#followed.has(id) && this.#followed.size < MAX_FOLLOWED) {
-        const onProgress = (event) => this.#cards.get(id)?.update({ ...this.#cards.get(id).job, ...event });
-        this.#followed.set(id, followJob(id, onProgress, () => this.#ended(id)));
+        this.#followed.set(id, followJob(id, (event) => this.#onProgress(id, event), () => this.#ended(id)));
       }
     }
+  }
+
+  // The events start with the job's first, which the list has left behind.
+  #onProgress(id, event) {
+    const card = this.#cards.get(id);
+    if (card && event.fraction >= (card.job.fraction ?? 0)) card.update({ ...card.job, ...event });
   }
 
   #unfollow(id) {
@@ -72,18 +81,9 @@ export class JobList {
     this.#followed.delete(id);
   }
 
-  async #ended(id) {
+  #ended(id) {
     this.#unfollow(id);
-    const job = await getJob(id).catch(() => null);
-    if (job) this.#cards.get(id)?.update(job);
-  }
-
-  async #cancel(id) {
-    await this.#act(() => cancelJob(id));
-  }
-
-  async #delete(id) {
-    await this.#act(() => deleteJob(id));
+    this.refresh();
   }
 
   async #act(action) {

@@ -11,7 +11,7 @@ import { PlainRenderer } from "./plain-renderer.js";
 const RENDERERS = { deferred: DeferredRenderer, forward: ForwardRenderer, plain: PlainRenderer };
 // Full resolution up to this many pixels; beyond it a phone gets warm and nobody sees the difference.
 const COMFORTABLE_PX = 2.2e6;
-const SETTLE_FRAMES = 2;
+const MEASURED_FRAMES = 20; // drawn when the work per frame changes, so that there is a figure to show
 
 /** Draws only when something changed, or always while `continuous`. */
 export class Stage {
@@ -129,12 +129,12 @@ export class Stage {
   resetTimes() {
     this.#clock.reset();
     this.#gpu.reset();
-    this.draw();
+    this.draw(MEASURED_FRAMES);
   }
 
-  /** Asks for a frame. */
-  draw() {
-    this.#pendingFrames = SETTLE_FRAMES;
+  /** Asks for frames. */
+  draw(frames = 1) {
+    this.#pendingFrames = Math.max(this.#pendingFrames, frames);
     this.#schedule();
   }
 

@@ -61,6 +61,7 @@ export class UploadForm {
   #add(picked) {
     if (this.#sending) return;
     this.#selection.add(picked);
+    byId("asset-name").value ||= this.#selection.suggestedName;
     const nothing = picked.length > 0 && this.#selection.files.length === 0;
     showProblem(byId("upload-problem"), nothing && new Problem({
       code: "no-images",
@@ -72,6 +73,7 @@ export class UploadForm {
 
   #clear() {
     this.#selection.clear();
+    byId("asset-name").value = "";
     showProblem(byId("upload-problem"), null);
     this.#show();
   }
@@ -116,7 +118,7 @@ export class UploadForm {
     try {
       const show = (sent, total) => this.#showSending(sent, total);
       const job = await sendCapture(this.#selection.files, options, show, this.#sending.signal);
-      this.#selection.clear();
+      this.#clear();
       this.#onCreated(job);
     } catch (error) {
       if (error.name !== "AbortError") showProblem(byId("upload-problem"), error);

@@ -174,7 +174,10 @@ def _interval_means(values: np.ndarray, edges: np.ndarray, axis: int) -> np.ndar
     values = np.moveaxis(values, axis, 0)
     step = len(values) // (len(edges) - 1)
     if (edges == np.arange(len(edges)) * step).all():
-        return np.moveaxis(sum(values[offset::step] for offset in range(step)) / step, 0, axis)
+        total = values[::step].copy()
+        for offset in range(1, step):
+            total += values[offset::step]
+        return np.moveaxis(total / step, 0, axis)
     integral = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
     whole = np.clip(np.floor(edges).astype(int), 0, len(values) - 1)
     share = (edges - whole).reshape(-1, *[1] * (values.ndim - 1))

@@ -16,6 +16,7 @@ from contextlib import suppress
 from typing import Any
 
 from service.job_folder import JobFolder
+from service.throttle import Throttle
 
 EXIT_REFUSED = 65
 EXIT_FAILED = 70
@@ -77,17 +78,14 @@ async def run_trainer(
 async def _follow(process: asyncio.subprocess.Process, publish: Publish, stall_s: float) -> dict[str, Any] | None:
     assert process.stdout is not None
     problem: dict[str, Any] | None = None
-    waiting: dict[str, Any] | None = None
-    published = -REPORT_INTERVAL_S
+    throttle = Throttle[dict[str, Any]](REPORT_INTERVAL_S)
     while line := await _line(process.stdout, stall_s):
         message = _message(line)
         problem = message.get("problem", problem)
-        waiting = message.get("report", waiting)
-        if waiting and time.monotonic() - published >= REPORT_INTERVAL_S:
-            await publish(waiting)
-            waiting, published = None, time.monotonic()
-    if waiting:
-        await publish(waiting)
+        if "report" in message and (report := throttle.offer(message["report"], time.monotonic())):
+            await publish(report)
+    if last := throttle.rest():
+        await publish(last)
     return problem
 
 

@@ -1,0 +1,57 @@
+"""A trainer that keeps the protocol but learns nothing: `python -m tests.api.fake_trainer FOLDER --parent PID`.
+
+What it does is the job's name: "quick", "slow" (counts in checkpoint/), "crash" (each time), "crash once", "hang", or
+"refuse".
+"""
+
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from service.atomic import write_atomically
+from service.parent import end_with_parent
+
+SLOW_STEPS = 400
+STEP_S = 0.05
+
+
+def main() -> None:
+    folder = Path(sys.argv[1])
+    end_with_parent(int(sys.argv[3]))
+    act = json.loads((folder / "job.json").read_text())["name"]
+    (folder / "checkpoint").mkdir(exist_ok=True)
+    if act == "refuse":
+        send(problem={"code": "capture-empty", "status": 422, "detail": "all photos are transparent"})
+        sys.exit(65)
+    if act == "crash" or (act == "crash once" and not (folder / "checkpoint" / "crashed").exists()):
+        (folder / "checkpoint" / "crashed").touch()
+        sys.exit(1)
+    if act == "hang":
+        time.sleep(3600)
+    count(folder, SLOW_STEPS if act == "slow" else 4)
+    for name, data in (("scene.glb", b"glTF" + bytes(1000)), ("preview.png", b"png"), ("report.json", b"{}")):
+        write_atomically(folder / "artifacts" / name, data)
+
+
+def count(folder: Path, steps: int) -> None:
+    """Counts up to `steps`, going on where it was stopped; traces every start in starts.log."""
+    state = folder / "checkpoint" / "count"
+    done = int(state.read_text()) if state.exists() else 0
+    with (folder / "starts.log").open("a") as log:
+        log.write(f"{os.getpid()} {done}\n")
+    while done < steps:
+        time.sleep(STEP_S)
+        done += 1
+        write_atomically(state, str(done).encode())
+        send(report={"stage": "field", "fraction": done / steps, "psnr": 20.0, "preview": False})
+
+
+def send(**message: Any) -> None:
+    print(json.dumps(message), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,132 @@
+"""Where the object is: the training frame, and the cells that it may fill (its visual hull).
+
+Photos with an alpha channel say it outright: a cell that some photo sees only as transparent is empty. Without alpha the
+region is the cube around the point that all cameras look at.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from core.capture import Capture, View
+from core.errors import CaptureEmpty
+from core.field.frame import Frame
+
+HULL_CELLS = 64
+# Of the distance from the looked-at point to the nearest camera: how far the first search reaches.
+SEARCH_REACH = 0.95
+# What fewer photos than this share see cannot be reconstructed.
+SEEN_SHARE = 0.1
+# Without alpha: of the median camera distance, what is taken for the object.
+REACH_WITHOUT_ALPHA = 0.5
+# Room around the hull, so that vertices at its rim can move outwards.
+MARGIN = 1.04
+
+
+@dataclass(frozen=True)
+class Region:
+    """Attributes:
+    frame: the cube that encloses the object.
+    hull: [64, 64, 64] bool, cells of the cube that may hold something.
+    """
+
+    frame: Frame
+    hull: np.ndarray
+
+
+def find_region(capture: Capture) -> Region:
+    """The region of a capture.
+
+    Raises:
+        CaptureEmpty: the photos' masks have no point in common.
+    """
+    centre, distances = _looked_at(capture.train)
+    everything = np.ones((HULL_CELLS,) * 3, bool)
+    if not capture.has_alpha:
+        return Region(Frame(centre, REACH_WITHOUT_ALPHA * float(np.median(distances))), everything)
+    frame = Frame(centre, SEARCH_REACH * float(distances.min()))
+    for _ in range(2):  # the second look refines the box that the first one finds
+        frame = _enclosing(frame, visual_hull(capture.train, frame))
+    return Region(frame, visual_hull(capture.train, frame))
+
+
+def visual_hull(views: Sequence[View], frame: Frame, cells: int = HULL_CELLS) -> np.ndarray:
+    """[cells]^3 bool: cells of the cube that no photo shows to be empty. Conservative: thin parts stay."""
+    ticks = (np.arange(cells) + 0.5) * (2.0 / cells) - 1.0
+    points = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), -1).reshape(-1, 3)
+    points = torch.from_numpy(frame.to_object(points).astype(np.float32))
+    radius = np.sqrt(3.0) / cells * frame.half
+    alive = torch.ones(len(points), dtype=torch.bool)
+    seen = torch.zeros(len(points), dtype=torch.int32)
+    for view in views:
+        index = alive.nonzero()[:, 0]
+        inside, filled = _look(view, points[index], radius)
+        seen[index] += inside
+        alive[index] &= filled | ~inside
+    alive &= seen >= max(2, SEEN_SHARE * len(views))
+    return alive.reshape(cells, cells, cells).numpy()
+
+
+def _look(view: View, points: Tensor, radius: float) -> tuple[Tensor, Tensor]:
+    """(whether each point is within the photo, whether the ball around it may touch the photo's mask)."""
+    camera = view.camera
+    to_camera = torch.from_numpy(np.linalg.inv(camera.world_from_camera).astype(np.float32))
+    local = points @ to_camera[:3, :3].T + to_camera[:3, 3]
+    depth = -local[:, 2]
+    in_front = depth > 2.0 * radius
+    safe = torch.where(in_front, depth, torch.ones_like(depth))
+    x = local[:, 0] / safe * camera.focal_px[0] + camera.centre_px[0]
+    y = -local[:, 1] / safe * camera.focal_px[1] + camera.centre_px[1]
+    width, height = camera.size_px
+    inside = in_front & (x >= 0) & (y >= 0) & (x < width) & (y < height)
+    if not inside.any():
+        return inside, inside
+    reach_px = radius * max(camera.focal_px) / safe
+    level = torch.ceil(torch.log2(reach_px.clamp_min(1.0))).int()
+    filled = torch.ones_like(inside)  # so close to the camera that the ball may fill the photo
+    solid = view.image_u8[..., 3] > 0
+    for k in range(max(width, height).bit_length() - 1):
+        at = (inside & (level == k)).nonzero()[:, 0]
+        if len(at):
+            mask = _touched_blocks(solid, 2**k)
+            filled[at] = mask[(y[at] / 2**k).long(), (x[at] / 2**k).long()]
+    return inside, filled
+
+
+def _touched_blocks(mask: np.ndarray, block: int) -> Tensor:
+    """[ceil(h / block), ceil(w / block)] bool: whether a block or one of its eight neighbours has a true pixel."""
+    image = torch.from_numpy(mask.astype(np.float32))[None, None]
+    pooled = functional.max_pool2d(image, block, block, ceil_mode=True)
+    return functional.max_pool2d(pooled, 3, 1, 1)[0, 0] > 0
+
+
+def _enclosing(frame: Frame, hull: np.ndarray) -> Frame:
+    filled = np.argwhere(hull)
+    if len(filled) == 0:
+        raise CaptureEmpty(
+            "capture",
+            "the photos must have something in common",
+            "masks without a common point in space",
+            "Check that the poses belong to these photos and follow the camera-to-world OpenGL convention.",
+        )
+    size = 2.0 / hull.shape[0]
+    low, high = filled.min(0) * size - 1.0, (filled.max(0) + 1) * size - 1.0
+    half = float((high - low).max()) / 2.0 * MARGIN
+    return Frame(frame.to_object((low + high) / 2.0), frame.half * half)
+
+
+def _looked_at(views: Sequence[View]) -> tuple[np.ndarray, np.ndarray]:
+    """The point nearest to all optical axes (least squares), and the cameras' distances from it."""
+    origins = np.array([view.camera.position for view in views])
+    axes = np.array([-view.camera.world_from_camera[:3, 2] for view in views])
+    projectors = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    # A little weight on the cameras' mean keeps the system solvable when all axes are parallel.
+    system = projectors.sum(0) + 1e-6 * len(views) * np.eye(3)
+    target = (projectors @ origins[:, :, None])[:, :, 0].sum(0) + 1e-6 * len(views) * origins.mean(0)
+    centre = np.linalg.solve(system, target)
+    distances = np.linalg.norm(origins - centre, axis=1)
+    return centre, np.maximum(distances, 1e-12 + 1e-6 * float(np.abs(origins).max()))

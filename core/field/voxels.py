@@ -1,0 +1,96 @@
+"""The voxel field: raw density and features on a grid of nodes, and which of its cells hold something."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+import warp as wp
+from torch import Tensor
+from torch.nn import functional
+
+from core.conventions import FEATURE_CHANNELS
+from core.field.parameters import Parameters
+from core.kernels.march import VoxelGrid
+
+# Raw density scales with the cube, so that a grid of any resolution starts equally thin.
+DENSITY_SCALE = 64.0
+INITIAL_DENSITY = 0.004
+EMPTY_DENSITY = -0.25  # also the lowest value: further down no gradient would bring it back
+HIGHEST_DENSITY = 30.0
+# A cell stays if its mean density over 3^3 nodes is above this: single nodes are noise (Adam moves them a full step).
+KEPT_DENSITY = -0.05
+STEP_PER_NODE = 0.75
+
+
+@dataclass
+class VoxelField:
+    """Attributes:
+    nodes: per axis.
+    parameters: of nodes^3 entries, scalar = raw density.
+    occupied: [cells, cells, cells] bool.
+    active: indices (int32) of the nodes near occupied cells; the only ones that train.
+    """
+
+    nodes: int
+    parameters: Parameters
+    occupied: Tensor
+    active: Tensor
+
+    @classmethod
+    def new(cls, nodes: int, hull: np.ndarray, seed: int, device: str) -> "VoxelField":
+        generator = torch.Generator().manual_seed(seed)
+        n = nodes**3
+        noise = torch.randn(n, FEATURE_CHANNELS, generator=generator)
+        density = torch.full((n,), INITIAL_DENSITY)
+        parameters = Parameters.starting_from(density.to(device), (0.5 + 0.02 * noise).to(device))
+        occupied = torch.from_numpy(hull.copy()).to(device)
+        return cls(nodes, parameters, occupied, _active_nodes(occupied, nodes))
+
+    @property
+    def step(self) -> float:
+        """Marching step, cube units."""
+        return 2.0 / (self.nodes - 1) * STEP_PER_NODE
+
+    def max_samples(self) -> int:
+        """No ray can take more steps than this."""
+        return int(np.ceil(2.0 * np.sqrt(3.0) / self.step)) + 2
+
+    def upsampled(self, nodes: int) -> "VoxelField":
+        """The same field on a finer grid, with fresh moments."""
+        old = torch.cat([self.parameters.scalar[:, None], self.parameters.features], 1)
+        grid = old.T.reshape(1, -1, self.nodes, self.nodes, self.nodes)
+        fine = functional.interpolate(grid, size=(nodes,) * 3, mode="trilinear", align_corners=True)
+        fine = fine[0].reshape(1 + FEATURE_CHANNELS, -1)
+        parameters = Parameters.starting_from(fine[0].contiguous(), fine[1:].T.contiguous())
+        return VoxelField(nodes, parameters, self.occupied, _active_nodes(self.occupied, nodes))
+
+    def update_occupancy(self, cells: int, hull: np.ndarray) -> None:
+        """Drops what is empty: cells whose averaged density is low, and cells outside of the hull."""
+        n = self.nodes
+        density = self.parameters.scalar.reshape(1, 1, n, n, n)
+        padded = functional.pad(density.clamp(max=1.0), (1,) * 6, value=EMPTY_DENSITY)
+        kept = (functional.avg_pool3d(padded, 3, 1) > KEPT_DENSITY).float()
+        near = functional.max_pool3d(kept, 3, 1, 1) > 0
+        self.parameters.scalar[~near.reshape(-1)] = EMPTY_DENSITY
+        occupied = functional.max_pool3d(functional.adaptive_max_pool3d(kept, cells), 3, 1, 1)[0, 0] > 0
+        allowed = torch.from_numpy(hull.astype(np.float32)).to(occupied.device)[None, None]
+        allowed = functional.interpolate(allowed, size=(cells,) * 3, mode="nearest")[0, 0] > 0
+        self.occupied = occupied & allowed
+        self.active = _active_nodes(self.occupied, n)
+
+    def grid(self) -> VoxelGrid:
+        """The field as kernels read it."""
+        grid = VoxelGrid()
+        grid.nodes, grid.cells = self.nodes, self.occupied.shape[0]
+        grid.density = wp.from_torch(self.parameters.scalar)
+        grid.features = self.parameters.feature_state().value
+        grid.occupied = wp.from_torch(self.occupied.to(torch.uint8).reshape(-1).contiguous())
+        grid.step, grid.density_scale = self.step, DENSITY_SCALE
+        return grid
+
+
+def _active_nodes(occupied: Tensor, nodes: int) -> Tensor:
+    """Indices of the nodes that samples in occupied cells may read."""
+    grid = functional.interpolate(occupied.float()[None, None], size=(nodes,) * 3, mode="nearest")
+    near = functional.max_pool3d(grid, 5, 1, 2).reshape(-1) > 0
+    return near.nonzero()[:, 0].to(torch.int32)

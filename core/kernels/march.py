@@ -1,0 +1,191 @@
+"""Ray marching through a voxel grid of density and features, and its gradient by hand.
+
+Symbols: a sample n of a ray has opacity a_n = 1 - exp(-relu(raw) * density_scale * step), transmittance
+T_n = prod_{m<n} (1 - a_m), weight w_n = T_n a_n. A ray yields F = sum w_n f_n and A = sum w_n (eq. 2).
+
+Gradient without division: with s_n = dL/dw_n and B_n = what lies behind (B_last = 0, B_{n-1} = a_n s_n + (1 - a_n) B_n),
+dL/da_n = T_n (s_n - B_n).
+"""
+
+import warp as wp
+
+from core.kernels.types import FAR, cell_of, corner_offset, corner_weight, cube_span, node_of, safe_inverse, vec8
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+# A dead ReLU gets no gradient: samples this far below zero are still recorded, with opacity 0.
+LEAK = wp.constant(-0.12)
+# Light that is left when a ray stops.
+OPAQUE = wp.constant(1.0e-3)
+# Samples that weigh less leave the features alone: their gradient is noise.
+MIN_FEATURE_WEIGHT = wp.constant(1.0e-4)
+
+
+@wp.struct
+class VoxelGrid:
+    nodes: int  # per axis
+    density: wp.array(dtype=float)  # raw, [nodes^3]
+    features: wp.array(dtype=vec8)  # [nodes^3]
+    cells: int  # of the occupancy grid, per axis
+    occupied: wp.array(dtype=wp.uint8)  # [cells^3]
+    step: float
+    density_scale: float
+
+
+@wp.struct
+class Samples:
+    t: wp.array2d(dtype=float)  # [rays, capacity]
+    alpha: wp.array2d(dtype=float)
+    transmittance: wp.array2d(dtype=float)
+    features: wp.array2d(dtype=vec8)
+    count: wp.array(dtype=int)  # [rays]; capacity + 1 where a ray needed more
+
+
+@wp.func
+def steps_to_next_cell(p: wp.vec3, d: wp.vec3, cells: int, step: float):
+    """Whole steps that take a ray out of its cell, at least 1."""
+    size = 2.0 / float(cells)
+    leave = float(FAR)
+    for axis in range(3):
+        inverse = safe_inverse(d[axis])
+        j = wp.floor((p[axis] + 1.0) / size)
+        boundary = wp.where(d[axis] > 0.0, j + 1.0, j) * size - 1.0
+        if wp.abs(inverse) < FAR:
+            leave = wp.min(leave, (boundary - p[axis]) * inverse)
+    return wp.max(wp.ceil(leave / step), 1.0)
+
+
+@wp.kernel
+def march_forward(
+    first: int,
+    grid: VoxelGrid,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    jitter: wp.array(dtype=float),
+    samples: Samples,
+    features: wp.array(dtype=vec8),
+    alpha: wp.array(dtype=float),
+):
+    r = first + wp.tid()
+    o = origins[r]
+    d = directions[r]
+    start, stop = cube_span(o, d, 0.9999)
+    t = start + grid.step * jitter[r]
+    capacity = samples.t.shape[1]
+    T = float(1.0)
+    A = float(0.0)
+    F = vec8()
+    n = int(0)
+    while t < stop:
+        p = o + t * d
+        if grid.occupied[cell_of(p, grid.cells)] == wp.uint8(0):
+            t += steps_to_next_cell(p, d, grid.cells, grid.step) * grid.step
+        else:
+            base, f = node_of(p, grid.nodes)
+            raw = float(0.0)
+            for c in range(8):
+                raw += corner_weight(c, f) * grid.density[base + corner_offset(c, grid.nodes)]
+            if raw > LEAK:
+                if n == capacity:
+                    n = capacity + 1
+                    break
+                feature = vec8()
+                for c in range(8):
+                    feature += corner_weight(c, f) * grid.features[base + corner_offset(c, grid.nodes)]
+                a = float(0.0)
+                if raw > 0.0:
+                    a = 1.0 - wp.exp(-raw * grid.density_scale * grid.step)
+                samples.t[r, n] = t
+                samples.alpha[r, n] = a
+                samples.transmittance[r, n] = T
+                samples.features[r, n] = feature
+                n += 1
+                F += (T * a) * feature
+                A += T * a
+                T *= 1.0 - a
+                if T < OPAQUE:
+                    break
+            t += grid.step
+    samples.count[r] = n
+    features[r] = F
+    alpha[r] = A
+
+
+@wp.kernel
+def march_backward(
+    first: int,
+    grid: VoxelGrid,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    samples: Samples,
+    grad_F: wp.array(dtype=vec8),
+    grad_A: wp.array(dtype=float),
+    distortion: float,
+    part: int,
+    grad_density: wp.array2d(dtype=float),  # [parts, nodes^3]
+    grad_features: wp.array2d(dtype=vec8),
+    touched: wp.array(dtype=wp.uint8),
+):
+    """Adds dL/dF . F + dL/dA A, and the distortion loss of mip-NeRF 360 (eq. 15) in O(samples), to the accumulators."""
+    r = first + wp.tid()
+    o = origins[r]
+    d = directions[r]
+    gF = grad_F[r]
+    gA = grad_A[r]
+    count = wp.min(samples.count[r], samples.t.shape[1])
+    W = float(0.0)  # sums of w and w t over all samples
+    Wt = float(0.0)
+    for n in range(count):
+        w = samples.transmittance[r, n] * samples.alpha[r, n]
+        W += w
+        Wt += w * samples.t[r, n]
+    behind = float(0.0)
+    W_behind = float(0.0)
+    Wt_behind = float(0.0)
+    for k in range(count):
+        n = count - 1 - k
+        t = samples.t[r, n]
+        a = samples.alpha[r, n]
+        T = samples.transmittance[r, n]
+        w = T * a
+        W_front = W - W_behind - w
+        Wt_front = Wt - Wt_behind - w * t
+        spread = t * W_front - Wt_front + Wt_behind - t * W_behind + w * grid.step / 3.0
+        s = gA + wp.dot(gF, samples.features[r, n]) + distortion * 2.0 * spread
+        W_behind += w
+        Wt_behind += w * t
+        grad_alpha = T * (s - behind)
+        behind = a * s + (1.0 - a) * behind
+        grad_raw = grad_alpha * (1.0 - a) * grid.step * grid.density_scale
+        base, f = node_of(o + t * d, grid.nodes)
+        for c in range(8):
+            node = base + corner_offset(c, grid.nodes)
+            weight = corner_weight(c, f)
+            wp.atomic_add(grad_density, part, node, weight * grad_raw)
+            if w > MIN_FEATURE_WEIGHT:
+                wp.atomic_add(grad_features, part, node, (weight * w) * gF)
+            touched[node] = wp.uint8(1)
+
+
+@wp.kernel
+def survey(
+    first: int,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    samples: Samples,
+    cells: int,
+    part: int,
+    peak: wp.array2d(dtype=float),  # [parts, cells^3], largest w seen in the cell
+    mass: wp.array2d(dtype=float),  # [parts, cells^3], sum of w
+    moment: wp.array2d(dtype=wp.vec3),  # [parts, cells^3], sum of w p
+):
+    """What the rays saw in each cell."""
+    r = first + wp.tid()
+    for n in range(wp.min(samples.count[r], samples.t.shape[1])):
+        w = samples.transmittance[r, n] * samples.alpha[r, n]
+        if w > 1.0e-3:
+            p = origins[r] + samples.t[r, n] * directions[r]
+            cell = cell_of(p, cells)
+            wp.atomic_max(peak, part, cell, w)
+            wp.atomic_add(mass, part, cell, w)
+            wp.atomic_add(moment, part, cell, w * p)

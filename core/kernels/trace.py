@@ -1,0 +1,200 @@
+"""Ray tracing a quad mesh whose vertices stay within their cells (supplement G).
+
+A ray walks through the cells of the P grid (Amanatides and Woo 1987). Each kept cell lists the at most twelve quads that
+use its vertex; a hit counts only if it lies within that cell's stretch of the ray. A quad lies in the block of its four
+cells, so every hit is found exactly once and in order.
+
+Triangles are hit by edge functions in a frame aligned with the ray; the two triangles of a quad share its diagonal, so
+that no ray slips between them.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from core.kernels.types import FAR, cube_span, safe_inverse, vec8
+
+OPTIONS = {"enable_backward": False, "fast_math": True}
+wp.set_module_options(OPTIONS)
+
+# Light that is left when the continuous model stops.
+OPAQUE = wp.constant(1.0e-3)
+
+
+@wp.struct
+class QuadMesh:
+    """A quad's corners stand in the order 00, 01, 10, 11 of its (a, b) coordinates; its diagonal runs from 00 to 11."""
+
+    cells: int  # P, per axis
+    cell_slot: wp.array(dtype=wp.int32)  # [P^3] -> slot, or -1
+    slot_start: wp.array(dtype=wp.int32)  # [slots + 1] into slot_quads
+    slot_quads: wp.array(dtype=wp.int32)
+    quads: wp.array(dtype=wp.vec4i)  # [Q] -> vertices
+    vertices: wp.array(dtype=wp.vec3)
+
+
+@wp.struct
+class Hits:
+    """Along each ray, front to back."""
+
+    quad: wp.array2d(dtype=wp.int32)  # [rays, capacity]
+    ab: wp.array2d(dtype=wp.vec2)  # place on the quad, [0, 1]^2
+    t: wp.array2d(dtype=float)
+    alpha: wp.array2d(dtype=float)
+    transmittance: wp.array2d(dtype=float)
+    features: wp.array2d(dtype=vec8)
+    count: wp.array(dtype=wp.int32)  # [rays]
+
+
+@wp.func
+def corner_weights(ab: wp.vec2):
+    """Barycentric weights of corners 00, 01, 10, 11 at (a, b); the diagonal's triangles meet at a = b."""
+    a = ab[0]
+    b = ab[1]
+    if b >= a:
+        return wp.vec4(1.0 - b, b - a, 0.0, a)
+    return wp.vec4(1.0 - a, 0.0, a - b, b)
+
+
+@wp.func
+def into_frame(p: wp.vec3, e1: wp.vec3, e2: wp.vec3, d: wp.vec3):
+    return wp.vec3(wp.dot(p, e1), wp.dot(p, e2), wp.dot(p, d))
+
+
+@wp.func
+def hit_triangle(v0: wp.vec3, vm: wp.vec3, v3: wp.vec3):
+    """(t, weight of vm, weight of v3) where the frame's z axis meets a triangle; t < 0 where it misses."""
+    w0 = vm[0] * v3[1] - vm[1] * v3[0]
+    wm = v3[0] * v0[1] - v3[1] * v0[0]
+    w3 = v0[0] * vm[1] - v0[1] * vm[0]
+    area = w0 + wm + w3
+    inside = (w0 >= 0.0 and wm >= 0.0 and w3 >= 0.0) or (w0 <= 0.0 and wm <= 0.0 and w3 <= 0.0)
+    if area == 0.0 or not inside:
+        return wp.vec3(-1.0, 0.0, 0.0)
+    inverse = 1.0 / area
+    return wp.vec3((w0 * v0[2] + wm * vm[2] + w3 * v3[2]) * inverse, wm * inverse, w3 * inverse)
+
+
+@wp.func
+def hit_quad(mesh: QuadMesh, quad: int, o: wp.vec3, e1: wp.vec3, e2: wp.vec3, d: wp.vec3):
+    """(t, a, b) of the ray's hit on a quad; t < 0 where it misses."""
+    q = mesh.quads[quad]
+    v0 = into_frame(mesh.vertices[q[0]] - o, e1, e2, d)
+    v3 = into_frame(mesh.vertices[q[3]] - o, e1, e2, d)
+    hit = hit_triangle(v0, into_frame(mesh.vertices[q[1]] - o, e1, e2, d), v3)
+    if hit[0] > 0.0:
+        return wp.vec3(hit[0], hit[2], hit[1] + hit[2])
+    hit = hit_triangle(v0, into_frame(mesh.vertices[q[2]] - o, e1, e2, d), v3)
+    return wp.vec3(hit[0], hit[1] + hit[2], hit[2])
+
+
+@wp.func
+def insert_hit(hits: Hits, r: int, lowest: int, n: int, quad: int, hit: wp.vec3):
+    """Puts a hit among the hits lowest..n-1 of ray r, sorted by distance."""
+    m = int(n)
+    while m > lowest and hits.t[r, wp.max(m - 1, 0)] > hit[0]:
+        hits.t[r, m] = hits.t[r, m - 1]
+        hits.quad[r, m] = hits.quad[r, m - 1]
+        hits.ab[r, m] = hits.ab[r, m - 1]
+        m -= 1
+    hits.t[r, m] = hit[0]
+    hits.quad[r, m] = quad
+    hits.ab[r, m] = wp.vec2(hit[1], hit[2])
+
+
+@wp.func
+def perpendicular(d: wp.vec3):
+    """A unit vector at right angles to d."""
+    if wp.abs(d[0]) < 0.6:
+        return wp.normalize(wp.cross(wp.vec3(1.0, 0.0, 0.0), d))
+    return wp.normalize(wp.cross(wp.vec3(0.0, 1.0, 0.0), d))
+
+
+@cache
+def trace_kernel(alpha_of: Callable[..., float], surface_type: Any) -> wp.Kernel:
+    """The kernel that finds a ray's hits on a mesh whose opacity at a hit is `alpha_of(surface, quad, ab, point)`.
+
+    It records every hit until the light is used up: for the binary model until the second opaque hit (the first one's
+    opacity gradient needs what lies behind it), for both models until the continuous one's light is used up as well, or
+    until the hits' capacity is reached.
+    """
+
+    @wp.kernel(module="unique", module_options=OPTIONS)
+    def trace(
+        first: int,
+        mesh: QuadMesh,
+        surface: surface_type,
+        origins: wp.array(dtype=wp.vec3),
+        directions: wp.array(dtype=wp.vec3),
+        binary_only: int,
+        hits: Hits,
+    ):
+        r = first + wp.tid()
+        o = origins[r]
+        d = directions[r]
+        capacity = hits.t.shape[1]
+        P = mesh.cells
+        size = 2.0 / float(P)
+        t, stop = cube_span(o, d, 0.99999)
+        e1 = perpendicular(d)
+        e2 = wp.cross(d, e1)
+        cell = wp.vec3i()
+        side = wp.vec3i()
+        leave = wp.vec3()
+        pace = wp.vec3()
+        for axis in range(3):
+            inverse = safe_inverse(d[axis])
+            side[axis] = wp.where(d[axis] > 0.0, 1, -1)
+            cell[axis] = wp.clamp(int((o[axis] + d[axis] * t + 1.0) / size), 0, P - 1)
+            pace[axis] = size * wp.abs(inverse)
+            leave[axis] = FAR
+            if wp.abs(inverse) < FAR:
+                boundary = float(cell[axis] + (side[axis] + 1) / 2) * size - 1.0
+                leave[axis] = (boundary - o[axis]) * inverse
+        T = float(1.0)
+        opaque = int(0)
+        n = int(0)
+        alive = int(1)
+        if t >= stop:
+            alive = 0
+        while alive == 1:
+            t_leave = wp.min(leave)
+            slot = mesh.cell_slot[(cell[0] * P + cell[1]) * P + cell[2]]
+            if slot >= 0:
+                lowest = n
+                for k in range(mesh.slot_start[slot], mesh.slot_start[slot + 1]):
+                    quad = mesh.slot_quads[k]
+                    hit = hit_quad(mesh, quad, o, e1, e2, d)
+                    if hit[0] > 0.0 and hit[0] >= t and hit[0] < t_leave and n < capacity:
+                        insert_hit(hits, r, lowest, n, quad, hit)
+                        n += 1
+                m = int(lowest)
+                while m < n:
+                    alpha = alpha_of(surface, hits.quad[r, m], hits.ab[r, m], o + hits.t[r, m] * d)
+                    hits.alpha[r, m] = alpha
+                    hits.transmittance[r, m] = T
+                    T *= 1.0 - alpha
+                    if alpha > 0.5:
+                        opaque += 1
+                    m += 1
+                    if opaque >= 2 and (binary_only == 1 or T < OPAQUE):
+                        n = m
+                        alive = 0
+            t = t_leave
+            if t >= stop or n >= capacity:
+                alive = 0
+            if alive == 1:
+                axis = int(2)
+                if leave[0] <= leave[1] and leave[0] <= leave[2]:
+                    axis = 0
+                elif leave[1] <= leave[2]:
+                    axis = 1
+                cell[axis] = cell[axis] + side[axis]
+                leave[axis] = leave[axis] + pace[axis]
+                if cell[axis] < 0 or cell[axis] >= P:
+                    alive = 0
+        hits.count[r] = n
+
+    return trace

@@ -1,0 +1,196 @@
+"""Stages 1b and 2: the mesh, with opacity and features from a volume; continuous and binary models together.
+
+The mesh starts where the voxel field is seen. Rays meet it, not the volume between; its vertices, the volume and the
+network train on both models' errors (eq. 14), the binary one's share growing. In the end, quads that no ray sees go.
+"""
+
+from typing import Any
+
+import numpy as np
+import torch
+import warp as wp
+from torch import Tensor, nn
+
+from core.capture import Capture
+from core.field.frame import as_vec3, empty
+from core.field.network import shade
+from core.field.parameters import Parameters
+from core.field.region import Region
+from core.field.voxels import DENSITY_SCALE, VoxelField
+from core.kernels.adam import adam_vertices, bias_correction
+from core.kernels.launch import accumulator_parts, launch
+from core.kernels.surfaces import VOLUME_KERNELS, Volume, VolumeGradients, sample_volume
+from core.kernels.types import vec8
+from core.mesh.quad_mesh import VERTEX_REACH, QuadMesh, build_mesh
+from core.presets import Settings
+from core.training.loss import color_error, pixel_loss
+from core.training.marcher import Marcher, step_grid
+from core.training.pixels import PixelPool
+from core.training.stage import Stage
+from core.training.tracer import Tracer
+from core.training.voxel_stage import VoxelStage
+
+FEATURE_RATE, ALPHA_RATE, NETWORK_RATE = 0.01, 0.02, 2e-3
+VERTEX_RATE = 0.02  # in cells
+VERTEX_PULL = 1e-4
+FINAL_RATE = 0.1
+HIT_CAPACITY = 12
+SURVEY_RAYS, SURVEY_BATCH = 400_000, 8192
+SOLID_WEIGHT = 0.01  # a higher threshold leaves holes, which cost 3 dB
+SEEN_WEIGHT = 0.03
+BINARY_SHARE = (0.1, 0.7)  # of the loss, from the first step to the last
+PRUNING_STARTS = 0.75
+
+
+class FieldStage(Stage):
+    """Trains mesh and volume."""
+
+    name = "field"
+
+    def __init__(
+        self,
+        pool: PixelPool,
+        mesh: QuadMesh,
+        nodes: int,
+        active: Tensor,
+        parameters: Parameters,
+        network: nn.Sequential,
+        settings: Settings,
+        seed: int,
+        device: str,
+    ) -> None:
+        super().__init__(network, settings, settings.field_steps, seed, device)
+        self.mesh, self.nodes, self.active, self.parameters = mesh, nodes, active, parameters
+        self.seen = torch.zeros(len(mesh.quads), dtype=torch.bool, device=device)
+        self._pool = pool
+        self._tracer = Tracer(mesh, VOLUME_KERNELS, settings.field_batch, 1, HIT_CAPACITY)
+        self._volume = volume_of(nodes, parameters)
+        self._touched = torch.zeros(nodes**3, dtype=torch.uint8, device=device)
+        parts = accumulator_parts(device)
+        self._vertex_grad = torch.zeros(parts, *mesh.vertices.shape, device=device)
+        self._vertex_moments = (torch.zeros_like(mesh.vertices), torch.zeros_like(mesh.vertices))
+        self._centres = torch.from_numpy(mesh.centres()).to(device)
+        self._gradients = self._kernel_gradients()
+
+    @classmethod
+    def after(cls, voxels: VoxelStage, pool: PixelPool) -> "FieldStage":
+        """The stage that follows a finished voxel stage."""
+        settings, device = voxels.settings, voxels.device
+        mesh = _surveyed_mesh(voxels.field, pool, settings.cells, voxels.seed, device)
+        density = voxels.field.parameters.scalar.clamp_min(0.0)
+        # A quad stands for the matter within about a cell of it.
+        alpha = 1.0 - torch.exp(-density * (DENSITY_SCALE * mesh.cell_size))
+        parameters = Parameters.starting_from(alpha, voxels.field.parameters.features)
+        nodes, active = voxels.field.nodes, voxels.field.active
+        return cls(pool, mesh, nodes, active, parameters, voxels.network, settings, voxels.seed, device)
+
+    @classmethod
+    def restored(
+        cls, pool: PixelPool, state: dict[str, Any], network: nn.Sequential, settings: Settings, seed: int, device: str
+    ) -> "FieldStage":
+        nodes, active = state["nodes"], state["active"].to(device)
+        n = nodes**3
+        parameters = Parameters.starting_from(torch.zeros(n, device=device), torch.zeros(n, 8, device=device))
+        parameters.restore_rows(active.long(), state["rows"])
+        vertices = state["vertices"].to(device)
+        mesh = QuadMesh(settings.cells, state["kept"].numpy(), vertices, state["quads"].numpy())
+        stage = cls(pool, mesh, nodes, active, parameters, network, settings, seed, device)
+        stage.restore(state)
+        return stage
+
+    def step(self, rng: np.random.Generator) -> float:
+        batch = self._pool.draw(rng, self.settings.field_batch, supersampled=False)
+        sums = self._tracer.forward(batch, self._volume, binary_only=False)
+        (F, A), (F_binary, A_binary) = sums
+        for tensor in (F, A, F_binary, A_binary):
+            tensor.requires_grad_()
+        color = shade(self.network, F, A, batch.centre_directions)
+        color_binary = shade(self.network, F_binary, A_binary, batch.centre_directions)
+        share = BINARY_SHARE[0] + (BINARY_SHARE[1] - BINARY_SHARE[0]) * self.fraction
+        weight = self.settings.coverage
+        loss = (1.0 - share) * pixel_loss(color, A, batch.color, batch.alpha, weight)
+        loss = loss + share * pixel_loss(color_binary, A_binary, batch.color, batch.alpha, weight)
+        falling = FINAL_RATE**self.fraction
+        self.optimize_network(loss, NETWORK_RATE * falling)
+        n = float(self.settings.field_batch)
+        grads = (F.grad * n, A.grad * n), (F_binary.grad * n, A_binary.grad * n)
+        parts = self.parameters.parts
+        self._tracer.backward(batch, self._volume, *grads, self._gradients, parts)
+        rates = (ALPHA_RATE * falling, FEATURE_RATE * falling)
+        step_grid(self.parameters, wp.from_torch(self.active), self._touched, rates, 0.0, (0.0, 1.0),
+                  self.done + 1, self.device)  # fmt: skip
+        self._step_vertices(VERTEX_RATE * self.mesh.cell_size * falling)
+        if self.fraction >= PRUNING_STARTS or self.done + 1 == self.steps:
+            self.seen[self._tracer.seen_quads(SEEN_WEIGHT)] = True
+        return color_error(color_binary, A_binary, batch.color, batch.alpha)
+
+    def _step_vertices(self, rate: float) -> None:
+        reach = VERTEX_REACH * self.mesh.cell_size
+        state = [self.mesh.vertices, *self._vertex_moments, self._centres]
+        value, m1, m2, centres = (as_vec3(tensor) for tensor in state)
+        grad = as_vec3(self._vertex_grad)
+        inputs = [value, grad, m1, m2, centres, reach, rate, VERTEX_PULL, bias_correction(self.done + 1)]
+        launch(adam_vertices, len(self.mesh.vertices), inputs, self.device)
+
+    def _kernel_gradients(self) -> VolumeGradients:
+        gradients = VolumeGradients()
+        alpha, features = self.parameters.gradients
+        gradients.alpha, gradients.features = wp.from_torch(alpha), wp.from_torch(features, dtype=vec8)
+        gradients.touched = wp.from_torch(self._touched)
+        gradients.vertices = as_vec3(self._vertex_grad)
+        return gradients
+
+    def own_state(self) -> dict[str, Any]:
+        return {
+            "nodes": self.nodes,
+            "active": self.active,
+            "rows": self.parameters.rows(self.active.long()),
+            "kept": torch.from_numpy(self.mesh.kept),
+            "quads": torch.from_numpy(self.mesh.quads),
+            "vertices": self.mesh.vertices,
+            "vertex_moments": self._vertex_moments,
+            "seen": self.seen,
+        }
+
+    def restore_own(self, state: dict[str, Any]) -> None:
+        for mine, saved in zip(self._vertex_moments, state["vertex_moments"], strict=True):
+            mine.copy_(saved)
+        self.seen = state["seen"].to(self.device)
+
+
+def volume_of(nodes: int, parameters: Parameters) -> Volume:
+    """The volume as kernels read it."""
+    volume = Volume()
+    volume.nodes = nodes
+    volume.alpha = wp.from_torch(parameters.scalar)
+    volume.features = wp.from_torch(parameters.features, dtype=vec8)
+    return volume
+
+
+def sampled(volume: Volume, points: Tensor, device: str) -> tuple[Tensor, Tensor]:
+    """Opacity [n] and features [n, 8] of a volume at points [n, 3] of the cube."""
+    alpha, features = empty(len(points), device=device), empty(len(points), 8, device=device)
+    outputs = [wp.from_torch(alpha), wp.from_torch(features, dtype=vec8)]
+    launch(sample_volume, len(points), [volume, as_vec3(points), *outputs], device)
+    return alpha, features
+
+
+def _surveyed_mesh(field: VoxelField, pool: PixelPool, cells: int, seed: int, device: str) -> QuadMesh:
+    """The mesh around what random training rays see of the voxel field."""
+    parts, n = accumulator_parts(device), cells**3
+    totals = (
+        torch.zeros(parts, n, device=device),
+        torch.zeros(parts, n, device=device),
+        torch.zeros(parts, n, 3, device=device),
+    )
+    marcher, rng = Marcher(field, device), np.random.default_rng([seed, 2])
+    jitter = torch.full((SURVEY_BATCH,), 0.5, device=device)
+    for _ in range(SURVEY_RAYS // SURVEY_BATCH):
+        batch = pool.draw(rng, SURVEY_BATCH, supersampled=False)
+        marcher.forward(batch.origins, batch.directions, jitter)
+        marcher.survey(batch.origins, batch.directions, cells, totals)
+    peak, mass, moment = totals[0].amax(0), totals[1].sum(0), totals[2].sum(0)
+    shape = (cells,) * 3
+    centroid = (moment / mass.clamp_min(1e-9)[:, None]).cpu().numpy()
+    centroid[mass.cpu().numpy() <= 0] = np.nan
+    return build_mesh((peak > SOLID_WEIGHT).cpu().numpy().reshape(shape), centroid.reshape(*shape, 3), device)

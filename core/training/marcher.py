@@ -1,0 +1,99 @@
+"""Marches batches of rays through a voxel field and back, with buffers that grow where a ray needs more samples."""
+
+import torch
+import warp as wp
+from torch import Tensor
+
+from core.field.frame import as_vec3, empty
+from core.field.parameters import Parameters
+from core.field.voxels import VoxelField
+from core.kernels.adam import adam_grid, bias_correction
+from core.kernels.launch import launch
+from core.kernels.march import Samples, march_backward, march_forward, survey
+from core.kernels.types import vec8
+
+FIRST_CAPACITY = 48
+
+
+class Marcher:
+    """Buffers for rays through one voxel field."""
+
+    def __init__(self, field: VoxelField, device: str) -> None:
+        self.field, self.device = field, device
+        self._capacity = min(FIRST_CAPACITY, field.max_samples())
+        self._rays = 0
+        self._touched = torch.zeros(field.nodes**3, dtype=torch.uint8, device=device)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """To be called when the field's occupancy has changed."""
+        self._grid = self.field.grid()
+        self._active = wp.from_torch(self.field.active)
+
+    def forward(self, origins: Tensor, directions: Tensor, jitter: Tensor) -> tuple[Tensor, Tensor]:
+        """Features times opacity [n, 8] and opacity [n] along rays [n, 3]; jitter [n] in [0, 1) moves the samples."""
+        if self._rays != len(origins):
+            self._allocate(len(origins))
+        while True:
+            inputs = [
+                self._grid, as_vec3(origins), as_vec3(directions), wp.from_torch(jitter), self.samples,
+                wp.from_torch(self._features, dtype=vec8), wp.from_torch(self._alpha),
+            ]  # fmt: skip
+            launch(march_forward, len(origins), inputs, self.device)
+            # A ray that was cut short would train a different scene: redo the batch with more room.
+            if int(self._count.max()) <= self._capacity:
+                return self._features.clone(), self._alpha.clone()
+            self._capacity = min(2 * self._capacity, self.field.max_samples())
+            self._allocate(len(origins))
+
+    def backward(self, origins: Tensor, directions: Tensor, grad_F: Tensor, grad_A: Tensor, distortion: float) -> None:
+        """Adds the gradients of the last `forward` to the field's accumulators."""
+        scalar, features = self.field.parameters.gradients
+        shared = [
+            self._grid, as_vec3(origins), as_vec3(directions), self.samples,
+            wp.from_torch(grad_F, dtype=vec8), wp.from_torch(grad_A), distortion,
+        ]  # fmt: skip
+        outputs = [wp.from_torch(scalar), wp.from_torch(features, dtype=vec8), wp.from_torch(self._touched)]
+        parts = self.field.parameters.parts
+        launch(march_backward, len(origins), lambda part: [*shared, part, *outputs], self.device, parts)
+
+    def survey(self, origins: Tensor, directions: Tensor, cells: int, totals: tuple[Tensor, Tensor, Tensor]) -> None:
+        """Adds what the last `forward` saw to totals (peak, mass [parts, cells^3], moment [parts, cells^3, 3])."""
+        peak, mass, moment = totals
+        outputs = [wp.from_torch(peak), wp.from_torch(mass), as_vec3(moment)]
+        shared = [as_vec3(origins), as_vec3(directions), self.samples, cells]
+        launch(survey, len(origins), lambda part: [*shared, part, *outputs], self.device, peak.shape[0])
+
+    def adam(self, rates: tuple[float, float], decay: float, bounds: tuple[float, float], steps: int) -> None:
+        step_grid(self.field.parameters, self._active, self._touched, rates, decay, bounds, steps, self.device)
+
+    def _allocate(self, rays: int) -> None:
+        self._rays = rays
+        shape = (rays, self._capacity)
+        self._count = torch.zeros(rays, dtype=torch.int32, device=self.device)
+        self._features, self._alpha = empty(rays, 8, device=self.device), empty(rays, device=self.device)
+        samples = Samples()
+        samples.t = wp.empty(shape, dtype=float, device=self.device)
+        samples.alpha = wp.empty(shape, dtype=float, device=self.device)
+        samples.transmittance = wp.empty(shape, dtype=float, device=self.device)
+        samples.features = wp.empty(shape, dtype=vec8, device=self.device)
+        samples.count = wp.from_torch(self._count)
+        self.samples = samples
+
+
+def step_grid(
+    parameters: Parameters,
+    active: wp.array,
+    touched: Tensor,
+    rates: tuple[float, float],
+    decay: float,
+    bounds: tuple[float, float],
+    steps: int,
+    device: str,
+) -> None:
+    """One Adam step of the touched active nodes. Args: rates: of scalar and features. bounds: of the scalar."""
+    inputs = [
+        active, wp.from_torch(touched), parameters.scalar_state(), parameters.feature_state(),
+        rates[0], rates[1], decay, bounds[0], bounds[1], bias_correction(steps),
+    ]  # fmt: skip
+    launch(adam_grid, len(active), inputs, device)

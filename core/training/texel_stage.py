@@ -1,0 +1,155 @@
+"""Stage 2b: the texels themselves. What is trained here is what is shipped.
+
+Four sub-rays a pixel look up the nearest texel, as the viewer will. Both models at first, then the binary one alone, and
+in the end with opacity frozen (eq. 21).
+"""
+
+from typing import Any
+
+import numpy as np
+import torch
+import warp as wp
+from torch import Tensor, nn
+
+from core.field.network import shade
+from core.field.parameters import Parameters
+from core.kernels.adam import adam_texels
+from core.kernels.launch import launch
+from core.kernels.surfaces import TEXEL_KERNELS, TexelGradients, Texels
+from core.kernels.types import vec8
+from core.mesh.quad_mesh import QuadMesh, patch_weights
+from core.presets import Settings
+from core.training.field_stage import FieldStage, sampled, volume_of
+from core.training.loss import color_error, pixel_loss
+from core.training.pixels import PixelPool
+from core.training.stage import Stage
+from core.training.tracer import Tracer
+
+FEATURE_RATE, ALPHA_RATE, NETWORK_RATE = 0.02, 0.02, 2e-3
+FINAL_RATE = 0.1
+CONTINUOUS_UNTIL, OPACITY_UNTIL = 0.4, 0.75  # of the steps
+LEAST_BINARY_SHARE = 0.3
+SUBRAYS = 4
+HIT_CAPACITY = 24
+QUADS_AT_ONCE = 20_000
+
+
+class TexelStage(Stage):
+    """Trains the texels of a fixed mesh."""
+
+    name = "texels"
+
+    def __init__(
+        self,
+        pool: PixelPool,
+        mesh: QuadMesh,
+        parameters: Parameters,
+        network: nn.Sequential,
+        settings: Settings,
+        seed: int,
+        device: str,
+    ) -> None:
+        super().__init__(network, settings, settings.texel_steps, seed, device)
+        self.mesh, self.parameters = mesh, parameters
+        self._pool = pool
+        self._tracer = Tracer(mesh, TEXEL_KERNELS, settings.texel_batch, SUBRAYS, HIT_CAPACITY)
+        self._texels = Texels()
+        self._texels.K = settings.patch
+        self._texels.alpha = wp.from_torch(parameters.scalar)
+        self._texels.features = wp.from_torch(parameters.features, dtype=vec8)
+        n, parts = len(parameters.scalar), parameters.parts
+        capacity = min(n, settings.texel_batch * SUBRAYS * HIT_CAPACITY)
+        self._updates = torch.zeros(n, dtype=torch.int32, device=device)
+        self._stamp = torch.full((parts, n), -1, dtype=torch.int32, device=device)
+        self._touched = torch.empty(parts, capacity, dtype=torch.int32, device=device)
+        self._touched_count = torch.zeros(parts, dtype=torch.int32, device=device)
+
+    @classmethod
+    def after(cls, field: FieldStage, pool: PixelPool) -> "TexelStage":
+        """The stage that follows a finished field stage: its quads that are seen, with the volume baked onto them."""
+        mesh = field.mesh.with_quads(field.seen.cpu().numpy())
+        volume = volume_of(field.nodes, field.parameters)
+        baked = [sampled(volume, points, field.device) for points in _texel_points(mesh, field.settings.patch)]
+        alpha, features = (torch.cat([part[i] for part in baked]) for i in (0, 1))
+        parameters = Parameters.starting_from(alpha, features)
+        return cls(pool, mesh, parameters, field.network, field.settings, field.seed, field.device)
+
+    @classmethod
+    def restored(
+        cls, pool: PixelPool, state: dict[str, Any], network: nn.Sequential, settings: Settings, seed: int, device: str
+    ) -> "TexelStage":
+        mesh = QuadMesh(settings.cells, state["kept"].numpy(), state["vertices"].to(device), state["quads"].numpy())
+        n = len(state["rows"]["scalar"])
+        parameters = Parameters.starting_from(torch.zeros(n, device=device), torch.zeros(n, 8, device=device))
+        parameters.restore_rows(torch.arange(n, device=device), state["rows"])
+        stage = cls(pool, mesh, parameters, network, settings, seed, device)
+        stage.restore(state)
+        return stage
+
+    def step(self, rng: np.random.Generator) -> float:
+        both, with_alpha = self.fraction < CONTINUOUS_UNTIL, self.fraction < OPACITY_UNTIL
+        batch = self._pool.draw(rng, self.settings.texel_batch, supersampled=True)
+        (F, A), (F_binary, A_binary) = self._tracer.forward(batch, self._texels, binary_only=not both)
+        for tensor in (F, A, F_binary, A_binary):
+            tensor.requires_grad_()
+        weight = self.settings.coverage
+        color = shade(self.network, F_binary, A_binary, batch.centre_directions)
+        loss = pixel_loss(color, A_binary, batch.color, batch.alpha, weight)
+        if both:
+            share = max(LEAST_BINARY_SHARE, self.fraction / CONTINUOUS_UNTIL)
+            soft = shade(self.network, F, A, batch.centre_directions)
+            loss = share * loss + (1.0 - share) * pixel_loss(soft, A, batch.color, batch.alpha, weight)
+        falling = FINAL_RATE**self.fraction
+        self.optimize_network(loss, NETWORK_RATE * falling)
+        n = float(self.settings.texel_batch)
+        grads = [(_scaled(f, n), _scaled(a, n)) for f, a in ((F, A), (F_binary, A_binary))]
+        self._tracer.backward(
+            batch, self._texels, grads[0], grads[1], self._kernel_gradients(with_alpha), self.parameters.parts
+        )
+        self._adam(ALPHA_RATE * falling if with_alpha else 0.0, FEATURE_RATE * falling)
+        return color_error(color, A_binary, batch.color, batch.alpha)
+
+    def _kernel_gradients(self, with_alpha: bool) -> TexelGradients:
+        self._touched_count.zero_()
+        alpha, features = self.parameters.gradients
+        gradients = TexelGradients()
+        gradients.alpha, gradients.features = wp.from_torch(alpha), wp.from_torch(features, dtype=vec8)
+        gradients.stamp, gradients.touched = wp.from_torch(self._stamp), wp.from_torch(self._touched)
+        gradients.touched_count = wp.from_torch(self._touched_count)
+        gradients.batch, gradients.with_alpha = self.done, int(with_alpha)
+        return gradients
+
+    def _adam(self, alpha_rate: float, feature_rate: float) -> None:
+        touched, stamp = wp.from_torch(self._touched), wp.from_torch(self._stamp)
+        state = [self.parameters.scalar_state(), self.parameters.feature_state(), wp.from_torch(self._updates)]
+        for part, count in enumerate(self._touched_count.tolist()):
+            inputs = [touched, stamp, self.done, part, *state, alpha_rate, feature_rate]
+            launch(adam_texels, count, inputs, self.device)
+
+    def own_state(self) -> dict[str, Any]:
+        everything = torch.arange(len(self.parameters.scalar), device=self.device)
+        return {
+            "rows": self.parameters.rows(everything),
+            "updates": self._updates,
+            "kept": torch.from_numpy(self.mesh.kept),
+            "quads": torch.from_numpy(self.mesh.quads),
+            "vertices": self.mesh.vertices,
+        }
+
+    def restore_own(self, state: dict[str, Any]) -> None:
+        self._updates.copy_(state["updates"])
+
+
+def _scaled(tensor: Tensor, n: float) -> Tensor:
+    """The gradient times n; zero where the loss does not depend on the tensor."""
+    return torch.zeros_like(tensor) if tensor.grad is None else tensor.grad * n
+
+
+def _texel_points(mesh: QuadMesh, K: int) -> list[Tensor]:
+    """The texels' centres [n * K * K, 3] in the cube, some quads at a time."""
+    weights = torch.from_numpy(patch_weights(K).astype(np.float32)).to(mesh.vertices.device)
+    quads = torch.from_numpy(mesh.quads).long().to(mesh.vertices.device)
+    return [
+        torch.einsum("abk,qkd->qabd", weights, mesh.vertices[some]).reshape(-1, 3).contiguous()
+        for some in quads.split(QUADS_AT_ONCE)
+    ]

@@ -1,0 +1,122 @@
+"""Stage 1a: a voxel field, coarse to fine. It finds out in a minute where surfaces are.
+
+The paper's stage 1 learns opacity with 8 x 384 networks on the mesh itself, for hours. A voxel field learns the same
+scene 100 times faster, and the mesh then starts from where its surfaces are.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch import nn
+
+from core.capture import Capture
+from core.field.network import shade
+from core.field.region import Region
+from core.field.voxels import EMPTY_DENSITY, HIGHEST_DENSITY, VoxelField
+from core.presets import Settings
+from core.training.loss import color_error, pixel_loss
+from core.training.marcher import Marcher
+from core.training.pixels import PixelPool
+from core.training.stage import Stage
+
+DENSITY_RATE, FEATURE_RATE, NETWORK_RATE = 0.08, 0.03, 5e-3
+FINAL_RATE = 0.1  # rates fall to this share, exponentially
+DENSITY_DECAY = 0.05  # empty space must cost something; falls to nothing
+OCCUPANCY_INTERVAL = 50
+SMALLEST_IMAGE_PX = 100
+PIXELS_PER_NODE = 1.5  # photos finer than the grid teach it nothing
+
+
+@dataclass(frozen=True)
+class Level:
+    """A grid resolution: nodes per axis, the step it ends at, cells of its occupancy grid, batch size."""
+
+    nodes: int
+    end: int
+    occupancy_cells: int
+    batch: int
+
+
+def levels_of(settings: Settings) -> tuple[Level, ...]:
+    """Four resolutions up to the settings' own; the coarse ones take short, cheap steps."""
+    n, total = settings.nodes, settings.voxel_steps
+    batch = settings.voxel_batch
+    shares = ((n // 6, 0.2, 4), (n // 3, 0.5, 2), (n * 3 // 4, 0.75, 1), (n, 1.0, 1))
+    return tuple(
+        Level(max(nodes, 16), round(share * total), min(max(64, n // 3), 96), max(batch // part, 64))
+        for nodes, share, part in shares
+    )
+
+
+class VoxelStage(Stage):
+    """Trains the voxel field."""
+
+    name = "voxels"
+
+    def __init__(
+        self, capture: Capture, region: Region, network: nn.Sequential, settings: Settings, seed: int, device: str
+    ) -> None:
+        super().__init__(network, settings, settings.voxel_steps, seed, device)
+        self.capture, self.region = capture, region
+        self._levels = levels_of(settings)
+        self._enter(VoxelField.new(self._levels[0].nodes, region.hull, seed, device))
+
+    def _enter(self, field: VoxelField) -> None:
+        self.field, self.marcher = field, Marcher(field, self.device)
+        largest = max(max(view.camera.size_px) for view in self.capture.train)
+        factor = min(round(largest / (PIXELS_PER_NODE * field.nodes)), largest // SMALLEST_IMAGE_PX)
+        self._pool = PixelPool(self.capture.train, self.region.frame, self.device, max(1, factor), self.seed)
+        self._steps_here = 0
+
+    def _level(self) -> Level:
+        return next(level for level in self._levels if self.done < level.end or level is self._levels[-1])
+
+    def step(self, rng: np.random.Generator) -> float:
+        level = self._level()
+        if level.nodes != self.field.nodes:
+            self._enter(self.field.upsampled(level.nodes))
+            self._update_occupancy(level)
+        elif self._steps_here and self._steps_here % OCCUPANCY_INTERVAL == 0:
+            self._update_occupancy(level)
+        self._steps_here += 1
+        batch = self._pool.draw(rng, level.batch, supersampled=False)
+        jitter = torch.from_numpy(rng.random(level.batch, dtype=np.float32)).to(self.device)
+        F, A = self.marcher.forward(batch.origins, batch.directions, jitter)
+        F.requires_grad_()
+        A.requires_grad_()
+        color = shade(self.network, F, A, batch.directions)
+        loss = pixel_loss(color, A, batch.color, batch.alpha, self.settings.coverage)
+        falling = FINAL_RATE**self.fraction
+        self.optimize_network(loss, NETWORK_RATE * falling)
+        # The photos' noise floor moves the distortion's weight with the batch mean, not with the batch size.
+        distortion = self.settings.distortion if level is not self._levels[0] else 0.0
+        n = float(level.batch)
+        self.marcher.backward(batch.origins, batch.directions, F.grad * n, A.grad * n, distortion)
+        rates = (DENSITY_RATE * falling, FEATURE_RATE * falling)
+        decay = DENSITY_DECAY * (1.0 - self.fraction)
+        self.marcher.adam(rates, decay, (EMPTY_DENSITY, HIGHEST_DENSITY), self._steps_here)
+        return color_error(color, A, batch.color, batch.alpha)
+
+    def _update_occupancy(self, level: Level) -> None:
+        self.field.update_occupancy(level.occupancy_cells, self.region.hull)
+        self.marcher.refresh()
+
+    def own_state(self) -> dict[str, Any]:
+        index = self.field.active.long()
+        return {
+            "nodes": self.field.nodes,
+            "steps_here": self._steps_here,
+            "occupied": self.field.occupied,
+            "active": self.field.active,
+            "rows": self.field.parameters.rows(index),
+        }
+
+    def restore_own(self, state: dict[str, Any]) -> None:
+        field = VoxelField.new(state["nodes"], self.region.hull, self.seed, self.device)
+        field.parameters.scalar.fill_(EMPTY_DENSITY)
+        field.occupied, field.active = state["occupied"].to(self.device), state["active"].to(self.device)
+        field.parameters.restore_rows(field.active.long(), state["rows"])
+        self._enter(field)
+        self._steps_here = state["steps_here"]

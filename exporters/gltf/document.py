@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from core.errors import AssetInvalid
+from exporters.gltf.invalid import invalid
 
 _MAGIC = 0x46546C67  # "glTF"
 _JSON = 0x4E4F534A
@@ -20,12 +20,6 @@ _COMPONENTS: dict[int, np.dtype[Any]] = {
     5126: np.dtype("<f4"),
 }
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
-REMEDY = "Download the file again, or convert the capture again."
-
-
-def invalid(subject: str, rule: str, received: str = "") -> AssetInvalid:
-    """The error for a file that breaks `rule`."""
-    return AssetInvalid(subject, rule, received, REMEDY)
 
 
 class Document:

@@ -7,8 +7,8 @@ import numpy as np
 
 from core.baked import ShaderNetwork
 from core.camera import Camera
-from core.errors import AssetInvalid
 from exporters.glsl import PROGRAMS, VERSIONS, Program, ShaderSources, shader_sources
+from exporters.gltf.invalid import invalid
 
 NAME = "POLYFIELD_materials_neural"
 CODING = "unorm8"
@@ -52,9 +52,9 @@ def network_from_json(json: dict[str, Any]) -> ShaderNetwork:
     layers = json["layers"]
     activations = tuple(layer["activation"] for layer in layers)
     if activations != ACTIVATIONS:
-        raise AssetInvalid("network", f"must have the activations {ACTIVATIONS}", str(activations)[:80])
-    w0, w1, w2 = (numbers(layer["weights"], "network weights").astype(np.float32) for layer in layers)
-    b0, b1, b2 = (numbers(layer["bias"], "network biases").astype(np.float32) for layer in layers)
+        raise invalid("network", f"must have the activations {ACTIVATIONS}", str(activations)[:80])
+    w0, w1, w2 = (numbers(layer["weights"], "network weights", np.float32) for layer in layers)
+    b0, b1, b2 = (numbers(layer["bias"], "network biases", np.float32) for layer in layers)
     return ShaderNetwork((w0, w1, w2), (b0, b1, b2))
 
 
@@ -69,7 +69,7 @@ def view_from_json(json: dict[str, Any], name: str) -> Camera:
     cx, cy = numbers(json["principalPoint"], "view's principal point").tolist()
     width, height = numbers(json["imageSize"], "view's image size").tolist()
     pose = matrix_from_column_major(json["objectFromCamera"], "view's pose")
-    return Camera(name, pose, (float(fx), float(fy)), (float(cx), float(cy)), (int(width), int(height)))
+    return Camera(name, pose, (fx, fy), (cx, cy), (int(width), int(height)))
 
 
 def shaders_from_json(json: dict[str, Any]) -> dict[str, ShaderSources]:
@@ -93,20 +93,20 @@ def column_major(matrix: np.ndarray) -> list[float]:
 
 def matrix_from_column_major(values: Any, subject: str) -> np.ndarray:
     """[4, 4] float64 of 16 numbers."""
-    return numbers(values, subject).astype(np.float64).reshape(4, 4).T.copy()
+    return numbers(values, subject).reshape(4, 4).T.copy()
 
 
-def numbers(values: Any, subject: str) -> np.ndarray:
-    """An array of JSON numbers (never of strings or booleans).
+def numbers(values: Any, subject: str, dtype: type[np.floating[Any]] = np.float64) -> np.ndarray:
+    """An array of JSON numbers (never of strings or booleans); too large for `dtype` becomes infinity.
 
     Raises:
         AssetInvalid: something else than numbers. ValueError: ragged lists.
     """
     array = np.asarray(values)
     if array.dtype.kind not in "iuf":
-        raise AssetInvalid(subject, "must hold numbers", str(values)[:80])
-    with np.errstate(over="ignore"):  # too large for float32 becomes infinity, which its user refuses
-        return array
+        raise invalid(subject, "must hold numbers", str(values)[:80])
+    with np.errstate(over="ignore"):
+        return array.astype(dtype)
 
 
 def shortest_numbers(values: np.ndarray) -> list[float]:

@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 from core.conventions import MAX_PAGE_SIZE_PX
-from core.errors import AssetInvalid
+from exporters.gltf.invalid import invalid
 
 # Measured on a 2048² page of 17 x 17 patches with noise, Pillow, one core: default strategy level 1 0.55 s 8.4 MB,
 # level 6 0.77 s 7.6 MB, level 9 1.5 s 7.5 MB; run-length strategy 0.39 s 7.5 MB at any level. Features are too noisy
@@ -45,14 +45,14 @@ def png_size(data: bytes, subject: str) -> tuple[int, int]:
         AssetInvalid: not a PNG of 8-bit RGBA, or larger than a page may be.
     """
     if len(data) < _HEADER.size:
-        raise AssetInvalid(subject, "must be a PNG image", f"{len(data)} bytes")
+        raise invalid(subject, "must be a PNG image", f"{len(data)} bytes")
     signature, _, kind, width, height, depth, color_type, *_ = _HEADER.unpack_from(data)
     if signature != _SIGNATURE or kind != b"IHDR":
-        raise AssetInvalid(subject, "must be a PNG image", "something else")
+        raise invalid(subject, "must be a PNG image", "something else")
     if (depth, color_type) != (8, _RGBA):
-        raise AssetInvalid(subject, "must be 8-bit RGBA", f"colour type {color_type} with {depth} bits")
+        raise invalid(subject, "must be 8-bit RGBA", f"colour type {color_type} with {depth} bits")
     if not (1 <= width <= MAX_PAGE_SIZE_PX and 1 <= height <= MAX_PAGE_SIZE_PX):
-        raise AssetInvalid(subject, f"must have 1 to {MAX_PAGE_SIZE_PX} px a side", f"{width} x {height} px")
+        raise invalid(subject, f"must have 1 to {MAX_PAGE_SIZE_PX} px a side", f"{width} x {height} px")
     return height, width
 
 
@@ -68,7 +68,7 @@ def decode_png(data: bytes, subject: str) -> np.ndarray:
             pixels = np.array(image)
     # Pillow reports a broken PNG in any of these ways.
     except (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, IndexError, KeyError) as error:
-        raise AssetInvalid(subject, "must be an intact PNG image", f"one that does not decode ({error})") from error
+        raise invalid(subject, "must be an intact PNG image", f"one that does not decode ({error})") from error
     if pixels.shape != (*size, 4) or pixels.dtype != np.uint8:
-        raise AssetInvalid(subject, "must be 8-bit RGBA", f"an image of shape {pixels.shape}")
+        raise invalid(subject, "must be 8-bit RGBA", f"an image of shape {pixels.shape}")
     return pixels

@@ -12,7 +12,8 @@ from core.conventions import is_opaque
 from core.errors import AssetInvalid, PolyfieldError
 from exporters.glsl import ShaderSources
 from exporters.gltf import extension
-from exporters.gltf.document import Document, invalid
+from exporters.gltf.document import Document
+from exporters.gltf.invalid import invalid
 from exporters.gltf.limits import check_size
 from exporters.gltf.png import decode_png, png_size
 
@@ -79,7 +80,7 @@ def _network(root: dict[str, Any]) -> dict[str, Any]:
 
 def _background(root: dict[str, Any]) -> tuple[float, float, float]:
     red, green, blue = extension.numbers(root.get("background", _WHITE), "background").tolist()
-    return float(red), float(green), float(blue)
+    return red, green, blue
 
 
 def _asset_from_object(document: Document) -> np.ndarray:

@@ -129,7 +129,7 @@ def _add_cameras(document: gltf.GLTF2, scene: BakedScene) -> list[dict[str, Any]
     views = []
     for camera in scene.cameras:
         document.cameras.append(camera_json(camera, float(np.linalg.norm(highest - lowest))))
-        matrix = extension.column_major(nearest_rigid(camera.world_from_camera))
+        matrix = _node_matrix(nearest_rigid(camera.world_from_camera))
         document.nodes.append(gltf.Node(name=camera.name, camera=len(document.cameras) - 1, matrix=matrix))
         views.append(extension.view_json(camera, len(document.nodes) - 1))
     return views
@@ -138,7 +138,12 @@ def _add_cameras(document: gltf.GLTF2, scene: BakedScene) -> list[dict[str, Any]
 def _add_object_node(document: gltf.GLTF2, scene: BakedScene) -> None:
     """Everything else hangs below node 0, so that cameras and meshes share the object frame."""
     document.nodes[0].children = list(range(1, len(document.nodes)))
-    document.nodes[0].matrix = extension.column_major(scene.asset_from_object)
+    document.nodes[0].matrix = _node_matrix(scene.asset_from_object)
+
+
+def _node_matrix(matrix: np.ndarray) -> list[float] | None:
+    """A node's matrix; none for the identity, which is glTF's default."""
+    return None if np.array_equal(matrix, np.eye(4)) else extension.column_major(matrix)
 
 
 def _check_similarity(matrix: np.ndarray) -> None:

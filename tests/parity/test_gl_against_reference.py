@@ -101,7 +101,7 @@ def test_saturated_network_shows_only_valid_colours(
     renderer = GlRenderer(context, write_glb(saturated)["scene.glb"])
     camera = scene.cameras[0]
     actual, reference = renderer.render(camera, mode), REFERENCES[mode](saturated, camera)
-    # Where a logit passes through zero the colour jumps, so float32 rounding may show there, in under 1 % of the pixels.
+    # Where a logit passes through zero the colour jumps, so float32 rounding may show there, in under 1 % of pixels.
     # NaN or infinity would show all over.
     shown = (actual[..., 3] == 1) & (reference[..., 3] == 1)
     differs = (np.abs(actual - reference).max(-1) > 3 / 255)[shown]

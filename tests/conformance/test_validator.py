@@ -1,0 +1,76 @@
+"""Khronos' glTF validator finds no error and no warning."""
+
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.baked import BakedScene
+from exporters.gltf import write_glb
+from tests.scenes import random_scene
+
+SCRIPT = Path(__file__).with_name("validate_gltf.mjs")
+NODE_MODULES = Path(__file__).parents[2] / "viewer_static" / "node_modules"
+
+
+def validated(glb: bytes, folder: Path) -> dict[str, Any]:
+    """The validator's report on a file."""
+    node = shutil.which("node")
+    assert node, "Node is missing: run `make setup`"
+    assert (NODE_MODULES / "gltf-validator").is_dir(), "gltf-validator is missing: run `make setup`"
+    path = folder / "scene.glb"
+    path.write_bytes(glb)
+    run = subprocess.run([node, SCRIPT, NODE_MODULES, path], capture_output=True, text=True, timeout=60, check=True)
+    return json.loads(run.stdout)
+
+
+def assert_clean(report: dict[str, Any]) -> None:
+    issues = report["issues"]
+    serious = [message for message in issues["messages"] if message["severity"] < 2]
+    assert (issues["numErrors"], issues["numWarnings"], serious) == (0, 0, [])
+    # Hints: the validator does not know the extension, nor that it uses the feature textures.
+    assert {message["code"] for message in issues["messages"]} <= {"UNSUPPORTED_EXTENSION", "UNUSED_OBJECT"}
+
+
+def test_validator_finds_nothing_in_a_scene_with_pages_and_cameras(scene: BakedScene, tmp_path: Path) -> None:
+    report = validated(write_glb(scene)["scene.glb"], tmp_path)
+    assert_clean(report)
+    assert report["info"]["totalTriangleCount"] == scene.triangle_count
+    assert report["info"]["maxUVs"] == 1
+
+
+@pytest.mark.parametrize(
+    "transform",
+    [np.eye(4), np.diag([2.5, 2.5, 2.5, 1.0])],
+    ids=["identity", "scaled"],
+)
+def test_validator_finds_nothing_with_other_object_transforms(transform: np.ndarray, tmp_path: Path) -> None:
+    scene = replace(random_scene(np.random.default_rng(1)), asset_from_object=transform, cameras=())
+    assert_clean(validated(write_glb(scene)["scene.glb"], tmp_path))
+
+
+def test_validator_finds_nothing_with_32_bit_indices(tmp_path: Path) -> None:
+    scene = _with_many_vertices(random_scene(np.random.default_rng(2)), 70_000)
+    assert_clean(validated(write_glb(scene)["scene.glb"], tmp_path))
+
+
+def _with_many_vertices(scene: BakedScene, count: int) -> BakedScene:
+    """The scene with its page's vertices repeated, and triangles that use the last copy."""
+    (page,) = scene.pages
+    copies = -(-count // len(page.positions))
+    return replace(
+        scene,
+        pages=(
+            replace(
+                page,
+                positions=np.tile(page.positions, (copies, 1)),
+                texcoords=np.tile(page.texcoords, (copies, 1)),
+                triangles=page.triangles + np.uint32((copies - 1) * len(page.positions)),
+            ),
+        ),
+    )

@@ -90,7 +90,7 @@ class Rasteriser:
         lens.focal, lens.centre = wp.vec2d(*camera.focal_px), wp.vec2d(*camera.centre_px)
         lens.width, lens.height = camera.size_px
         lens.nearest = wp.float64(nearest)
-        steps_per_depth = kernels.DEPTH_STEPS / (deepest - nearest) if deepest > nearest else 0.0
+        steps_per_depth = kernels.DEPTH_STEPS.value / (deepest - nearest) if deepest > nearest else 0.0
         lens.depth_scale = wp.float64(steps_per_depth)
         inputs = [self._positions, wp.vec3d(*camera.position), wp.mat33d(*rotation.T.ravel()), self._surface.vertices]
         launch(kernels.to_camera_frame, len(self._positions), inputs, self.device)
@@ -105,7 +105,7 @@ class Rasteriser:
 
     def _draw(self, lens: kernels.Lens, first_row: int, rows: int) -> wp.array:
         """The visibility buffer of a strip: rows * width keys."""
-        keys = wp.full(rows * lens.width, wp.uint64(kernels.EMPTY), dtype=wp.uint64, device=self.device)
+        keys = wp.full(rows * lens.width, kernels.EMPTY, dtype=wp.uint64, device=self.device)
         bands = CPU_BANDS if self.device == "cpu" else 1
         inputs = [self._surface, lens, self._boxes, first_row, rows, bands, keys]
         launch(kernels.draw, bands * len(self._boxes), inputs, self.device, parts=bands)

@@ -10,15 +10,12 @@ the triangle in the lower. Its minimum is the nearest triangle, the first of equ
 Texels of all pages lie in one array, page after page, row by row, a texel's 8 bytes in one integer (channel 0 lowest).
 """
 
-# `and` does not short-circuit in a kernel, and variables that a loop changes must be made by int() or float().
-# ruff: noqa: SIM102, UP018, RUF046
-
 import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-EMPTY = 0xFFFFFFFFFFFFFFFF  # a key behind everything
-DEPTH_STEPS = 4294967294.0  # the deepest key still lies before EMPTY
+EMPTY = wp.constant(wp.uint64(0xFFFFFFFFFFFFFFFF))  # a key behind everything
+DEPTH_STEPS = wp.constant(wp.float64(4294967294.0))  # the deepest key still lies before EMPTY
 
 vec16 = wp.types.vector(length=16, dtype=wp.float32)
 vec8 = wp.types.vector(length=8, dtype=wp.float32)
@@ -143,7 +140,8 @@ def include_edge(box: wp.vec4d, start: wp.vec3d, end: wp.vec3d) -> wp.vec4d:
         grown = include(grown, 1, -start[1] / start[2])
     if (start[2] < zero) != (end[2] < zero):
         for axis in range(2):
-            crossing = start[axis] * end[2] - end[axis] * start[2]  # times (end - start).z, whose sign is start's side
+            # The crossing point times (end.z - start.z); only its sign matters.
+            crossing = start[axis] * end[2] - end[axis] * start[2]
             if start[2] > end[2]:
                 crossing = -crossing
             if crossing >= zero:
@@ -203,10 +201,9 @@ def draw(
     for row in range(top, bottom):
         for column in range(box[0], box[2]):
             hit = intersect(surface, triangle, sample_ray(lens, column, row))
-            if hit.texel >= 0:
-                if is_opaque(surface.texels[hit.texel]):
-                    sample = (row - first_row) * lens.width + column
-                    wp.atomic_min(keys, sample, key_of(lens, hit.depth, triangle))
+            if hit.texel >= 0 and is_opaque(surface.texels[hit.texel]):
+                sample = (row - first_row) * lens.width + column
+                wp.atomic_min(keys, sample, key_of(lens, hit.depth, triangle))
 
 
 @wp.func
@@ -216,14 +213,14 @@ def is_opaque(texel: wp.uint64) -> bool:
 
 @wp.func
 def key_of(lens: Lens, depth: wp.float64, triangle: int) -> wp.uint64:
-    step = wp.clamp((depth - lens.nearest) * lens.depth_scale, wp.float64(0.0), wp.float64(4294967294.0))
+    step = wp.clamp((depth - lens.nearest) * lens.depth_scale, wp.float64(0.0), DEPTH_STEPS)
     return (wp.uint64(step) << wp.uint64(32)) | wp.uint64(triangle)
 
 
 @wp.func
 def triangle_of(key: wp.uint64) -> int:
     """The nearest triangle; -1 where nothing was drawn."""
-    if key == wp.uint64(0xFFFFFFFFFFFFFFFF):
+    if key == EMPTY:
         return -1
     return int(key & wp.uint64(0xFFFFFFFF))
 

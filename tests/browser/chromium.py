@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, Playwright, sync_playwright
 
 THREE = Path(__file__).resolve().parents[2] / "viewer_static" / "node_modules" / "three"
 QUIET = (
@@ -38,11 +38,17 @@ def executable() -> str | None:
 
 
 @contextmanager
-def running_browser(flags: tuple[str, ...] = SOFTWARE_WEBGL) -> Iterator[Browser]:
+def launched(playwright: Playwright, flags: tuple[str, ...] = SOFTWARE_WEBGL) -> Iterator[Browser]:
     """A headless browser that ends with the block."""
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=executable(), args=[*QUIET, *flags])
-        try:
-            yield browser
-        finally:
-            browser.close()
+    browser = playwright.chromium.launch(executable_path=executable(), args=[*QUIET, *flags])
+    try:
+        yield browser
+    finally:
+        browser.close()
+
+
+@contextmanager
+def running_browser(flags: tuple[str, ...] = SOFTWARE_WEBGL) -> Iterator[Browser]:
+    """A headless browser with a Playwright of its own, of which a thread may have only one."""
+    with sync_playwright() as playwright, launched(playwright, flags) as browser:
+        yield browser

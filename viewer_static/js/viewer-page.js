@@ -25,7 +25,7 @@ async function start() {
   listenForFiles();
   const source = sourceOfAddress();
   if (source) await show(source);
-  else showMessage({ title: "Open an asset", text: "Drop a .glb anywhere on this page, or choose one." });
+  else showMessage({ title: "Open an asset", text: "Choose a .glb file, or drop one on this page." });
 }
 
 // three.js is fetched only where it can run.

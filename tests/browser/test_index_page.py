@@ -1,0 +1,175 @@
+"""The first page, against an API that is faked."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.fake_jobs import FakeJobs, fake_job
+from tests.browser.site import Site
+
+PROBLEM = {
+    "status": 422,
+    "code": "pose-not-finite",
+    "title": "Pose not finite",
+    "detail": "pose of r_3: every entry must be a finite number, but got NaN. Leave this photo out.",
+    "remedy": "Leave this photo out.",
+}
+
+
+@pytest.fixture
+def api(site: Site) -> FakeJobs:
+    jobs = FakeJobs()
+    site.api = jobs
+    return jobs
+
+
+@pytest.fixture
+def capture(tmp_path: Path) -> Path:
+    """A folder as people have it: photos in a subfolder, a pose file, and clutter."""
+    folder = tmp_path / "teapot"
+    (folder / "train").mkdir(parents=True)
+    for i in range(3):
+        Image.new("RGB", (8, 8), (40 * i, 90, 120)).save(folder / "train" / f"r_{i}.png")
+    (folder / "transforms_train.json").write_text("{}")
+    (folder / ".DS_Store").write_text("clutter")
+    (folder / "notes.pdf").write_text("clutter")
+    return folder
+
+
+@pytest.fixture
+def preview(tmp_path: Path) -> bytes:
+    Image.new("RGB", (16, 16), (200, 120, 20)).save(tmp_path / "preview.png")
+    return (tmp_path / "preview.png").read_bytes()
+
+
+@pytest.fixture
+def phone(browser: Browser) -> Iterator[Page]:
+    context = browser.new_context(
+        viewport={"width": 390, "height": 844}, is_mobile=True, has_touch=True, device_scale_factor=2
+    )
+    yield context.new_page()
+    context.close()
+
+
+def test_folder_is_sent_with_paths_relative_to_its_pose_file(
+    page: Page, site: Site, api: FakeJobs, capture: Path
+) -> None:
+    page.goto(site.url)
+    page.set_input_files("#pick-folder", capture)
+    expect(page.locator("#selection-text")).to_contain_text("3 photos, 1 pose file")
+    expect(page.locator("#thumbnails img")).to_have_count(3)
+    page.locator("#presets label").filter(has_text="High").click()
+    page.get_by_role("button", name="Make the asset").click()
+    expect(page.locator(".job")).to_have_attribute("data-state", "queued")
+    names = set(re.findall(rb'name="files"; filename="([^"]*)"', api.uploads[0]))
+    assert names == {b"train/r_0.png", b"train/r_1.png", b"train/r_2.png", b"transforms_train.json"}
+    assert b'name="preset"\r\n\r\nhigh\r\n' in api.uploads[0]
+    assert b'name="name"\r\n\r\nteapot\r\n' in api.uploads[0]
+    assert b'name="seed"' not in api.uploads[0]
+    expect(page.locator("#selection")).to_be_hidden()
+
+
+def test_missing_pose_file_is_pointed_out_before_anything_is_sent(
+    page: Page, site: Site, api: FakeJobs, capture: Path
+) -> None:
+    page.goto(site.url)
+    page.set_input_files("#pick-files", sorted((capture / "train").iterdir()))
+    expect(page.locator("#selection-hint")).to_contain_text("transforms.json")
+    page.set_input_files("#pick-files", capture / "transforms_train.json")
+    expect(page.locator("#selection-hint")).to_be_hidden()
+    expect(page.locator("#selection-text")).to_contain_text("3 photos, 1 pose file")
+
+
+def test_files_without_photos_are_refused_at_once(page: Page, site: Site, api: FakeJobs, capture: Path) -> None:
+    page.goto(site.url)
+    page.set_input_files("#pick-files", capture / "notes.pdf")
+    expect(page.locator("#upload-problem")).to_contain_text("no photos")
+    expect(page.get_by_role("button", name="Make the asset")).to_be_disabled()
+
+
+def test_problem_shows_message_and_remedy_once_and_keeps_the_files(
+    browser: Browser, site: Site, api: FakeJobs, capture: Path
+) -> None:
+    page = browser.new_page()  # not the page fixture: a 422 is logged to the console as an error
+    api.refusal = PROBLEM
+    page.goto(site.url)
+    page.set_input_files("#pick-folder", capture)
+    page.get_by_role("button", name="Make the asset").click()
+    problem = page.locator("#upload-problem")
+    expect(problem.locator("strong")).to_have_text("pose of r_3: every entry must be a finite number, but got NaN.")
+    expect(problem.locator("span")).to_have_text("Leave this photo out.")
+    expect(problem).to_have_attribute("data-code", "pose-not-finite")
+    expect(page.get_by_role("button", name="Make the asset")).to_be_enabled()
+    page.close()
+
+
+def test_running_job_shows_stage_progress_psnr_and_preview(
+    page: Page, site: Site, api: FakeJobs, preview: bytes
+) -> None:
+    api.jobs = [fake_job("a1", "running", name="Teapot", stage="read", fraction=0.01)]
+    api.events["a1"] = [
+        {"stage": "read", "fraction": 0.01, "psnr": None, "preview": False},
+        {"stage": "field", "fraction": 0.42, "psnr": 27.18, "preview": True},
+    ]
+    api.previews["a1"] = preview
+    page.goto(site.url)
+    card = page.locator(".job")
+    expect(card.locator(".job-stage")).to_have_text("Training shape and appearance · 42 % · 27.18 dB")
+    expect(card.locator("progress")).to_have_js_property("value", 0.42)
+    expect(card.get_by_role("img", name="Preview of Teapot")).to_be_visible()
+
+
+def test_ready_job_links_to_viewer_and_file(page: Page, site: Site, api: FakeJobs) -> None:
+    artifacts = [{"name": "scene.glb", "bytes": 12_345_678, "url": "/jobs/a1/artifacts/scene.glb"}]
+    api.jobs = [fake_job("a1", "succeeded", psnr=31.234, artifacts=artifacts)]
+    page.goto(site.url)
+    expect(page.locator(".job-facts")).to_contain_text("31.23 dB · 12.3 MB")
+    expect(page.get_by_role("link", name="View in 3D")).to_have_attribute("href", f"{site.url}/viewer.html?job=a1")
+    link = page.get_by_role("link", name="Download")
+    expect(link).to_have_attribute("href", f"{site.url}/jobs/a1/artifacts/scene.glb")
+
+
+def test_failed_job_says_why(page: Page, site: Site, api: FakeJobs) -> None:
+    api.jobs = [fake_job("a1", "failed", problem=PROBLEM)]
+    page.goto(site.url)
+    expect(page.locator(".job-problem strong")).to_contain_text("must be a finite number")
+    expect(page.locator(".job-problem span")).to_have_text("Leave this photo out.")
+
+
+def test_cancel_and_delete_reach_the_service(page: Page, site: Site, api: FakeJobs) -> None:
+    api.jobs = [fake_job("a1", "queued")]
+    page.goto(site.url)
+    page.get_by_role("button", name="Cancel").click()
+    expect(page.locator(".job")).to_have_attribute("data-state", "cancelled")
+    page.get_by_role("button", name="Delete").click()
+    assert ("DELETE", "/jobs/a1") not in api.requests  # asks first
+    page.get_by_role("button", name="Really delete?").click()
+    expect(page.locator(".job")).to_have_count(0)
+    assert api.requests == [("POST", "/jobs/a1/cancel"), ("DELETE", "/jobs/a1")]
+    expect(page.locator("#jobs-empty")).to_be_visible()
+
+
+def test_page_fits_a_phone(phone: Page, site: Site, api: FakeJobs) -> None:
+    long_name = "an asset of which the name does not fit into one line of a phone"
+    api.jobs = [fake_job("a1", "failed", name=long_name, problem=PROBLEM), fake_job("a2", "succeeded", name=long_name)]
+    phone.goto(site.url)
+    expect(phone.locator(".job")).to_have_count(2)
+    assert phone.evaluate("document.documentElement.scrollWidth") <= 390
+    for button in phone.locator("a.button:visible, button:visible, label.button:visible").all():
+        box = button.bounding_box()
+        assert box
+        assert box["height"] >= 44 - 0.5, button.inner_text()  # a finger's width
+        assert box["x"] + box["width"] <= 390
+
+
+def test_service_that_is_gone_is_reported(browser: Browser, site: Site, api: FakeJobs) -> None:
+    page = browser.new_page()  # not the page fixture: the failed request is logged to the console
+    page.goto(site.url)
+    expect(page.locator("#jobs-empty")).to_be_visible()
+    page.route("**/jobs", lambda route: route.abort())
+    expect(page.locator("#jobs-offline")).to_contain_text("cannot be reached", timeout=8000)
+    page.close()

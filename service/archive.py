@@ -1,5 +1,6 @@
 """Zip archives from strangers."""
 
+import errno
 import stat
 import struct
 import zipfile
@@ -36,7 +37,15 @@ def extract(archive: Path, folder: Path, limits: Limits) -> None:
             entries = list(_entries(zipped, limits))
             _inflate_all(zipped, entries, folder, limits)
     except DAMAGED as error:
-        raise ArchiveInvalid(archive.name, "must be an intact zip archive", str(error)[:120], REPACK) from None
+        raise _damaged(archive, error) from None
+    except OSError as error:
+        if error.errno == errno.EINVAL:  # an offset before the file's start
+            raise _damaged(archive, error) from None
+        raise
+
+
+def _damaged(archive: Path, error: Exception) -> ArchiveInvalid:
+    return ArchiveInvalid(archive.name, "must be an intact zip archive", str(error)[:120], REPACK)
 
 
 def _entries(zipped: zipfile.ZipFile, limits: Limits) -> Iterator[tuple[zipfile.ZipInfo, PurePosixPath]]:

@@ -1,6 +1,5 @@
 """The whole path: photos -> capture -> scene -> scene.glb, read again and measured."""
 
-import math
 import shutil
 import time
 from collections.abc import Mapping
@@ -9,23 +8,23 @@ from pathlib import Path
 from typing import Any
 
 from core.baked import BakedScene
-from core.capture import WHITE, Capture, View
+from core.capture import WHITE
 from core.datasets import read_capture
 from core.device import resolve_device
 from core.evaluation import Evaluation, evaluate
 from core.presets import settings_for
 from core.progress import ProgressCallback, ignore_progress
 from core.reconstruct import reconstruct
-from core.render.raster import Rasteriser
 from exporters.gltf import read_glb, write_glb
 from service.atomic import write_atomically
 from service.capture_source import opened_capture
-from service.preview import over_background, png_bytes
+from service.preview import png_bytes, preview
 from service.report import Figure, Report
 from service.stages import EXPORT, MEASURE, READ, TRAIN, Stages
 
 SCENE, PREVIEW, REPORT = "scene.glb", "preview.png", "report.json"
 NO_HELD_OUT = "No view is held out, so the quality was not measured."
+BEST_PSNR = 100.0  # what an infinite one is reported as: JSON has no infinity
 
 
 def convert(
@@ -61,43 +60,35 @@ def convert(
         InputError: the capture or an option cannot be used.
         TrainingFailed
     """
-    stages = Stages(progress)
     started = time.perf_counter()
+    stages = Stages(progress)
     settings = settings_for(preset, **(overrides or {}))
     device = resolve_device(device)
+    photos = {"downscale": downscale, "max_size_px": max_size_px, "background": background}
     with stages.stage("read", READ), opened_capture(capture_path) as source:
-        capture = read_capture(source, max_size_px=max_size_px, downscale=downscale, background=background)
-
+        capture = read_capture(source, **photos)
     trained = reconstruct(
-        capture,
-        settings,
-        device=device,
-        seed=seed,
-        checkpoint_dir=checkpoint_dir,
-        progress=stages.within(TRAIN),
+        capture, settings, device=device, seed=seed, checkpoint_dir=checkpoint_dir, progress=stages.within(TRAIN)
     )
     stages.add(trained.seconds)
     with stages.stage("export", EXPORT):
-        out_dir.mkdir(parents=True, exist_ok=True)
-        sizes = _write(out_dir, write_glb(trained.scene))
-        scene = read_glb((out_dir / SCENE).read_bytes())
+        sizes, scene = _export(trained.scene, out_dir)
     with stages.stage("measure", MEASURE):
-        evaluation = evaluate(scene, capture.test, device) if capture.test else None
-        sizes |= _write(out_dir, {PREVIEW: png_bytes(_picture(scene, capture, device))})
+        evaluation = evaluate(scene, capture.test, device=device, progress=stages.within(MEASURE))
+        sizes |= _write(out_dir, {PREVIEW: png_bytes(preview(scene, capture, device))})
 
     report = Report(
         psnr=_figure(evaluation, "psnr"),
         ssim=_figure(evaluation, "ssim"),
-        seconds=_rounded(stages.seconds | {"total": time.perf_counter() - started}),
+        seconds=stages.seconds | {"total": time.perf_counter() - started},
         bytes=sizes,
         quads=scene.quad_count,
         triangles=scene.triangle_count,
         pages=len(scene.pages),
-        settings=asdict(settings)
-        | {"seed": seed, "downscale": downscale, "max_size_px": max_size_px, "background": list(background)},
+        settings=asdict(settings) | {"seed": seed, **photos},
         device=device,
         views={"train": len(capture.train), "test": len(capture.test)},
-        notes=capture.notes + (() if evaluation else (NO_HELD_OUT,)),
+        notes=capture.notes + (() if capture.test else (NO_HELD_OUT,)),
     )
     _write(out_dir, {REPORT: report.as_bytes()})
     if checkpoint_dir:
@@ -106,28 +97,21 @@ def convert(
     return report
 
 
+def _export(scene: BakedScene, folder: Path) -> tuple[dict[str, int], BakedScene]:
+    """Writes the asset; returns its sizes and the scene that the file holds."""
+    folder.mkdir(parents=True, exist_ok=True)
+    sizes = _write(folder, write_glb(scene))
+    return sizes, read_glb((folder / SCENE).read_bytes())
+
+
 def _write(folder: Path, files: Mapping[str, bytes]) -> dict[str, int]:
     for name, data in files.items():
         write_atomically(folder / name, data)
     return {name: len(data) for name, data in files.items()}
 
 
-def _picture(scene: BakedScene, capture: Capture, device: str) -> Any:
-    """The scene from the held-out view, else the training view, that shows most of it: [h, w, 3] uint8."""
-    view = max(capture.test or capture.train, key=_shown)
-    return over_background(Rasteriser(scene, device).deferred(view.camera), capture.background)
-
-
-def _shown(view: View) -> float:
-    return float(view.premultiplied()[1].mean())
-
-
-def _figure(evaluation: Evaluation | None, name: str) -> Figure:
-    if evaluation is None:
+def _figure(evaluation: Evaluation, name: str) -> Figure:
+    if not evaluation.views:
         return Figure(None, {})
-    per_view = {view.name: getattr(view, name) for view in evaluation.views}
-    return Figure(getattr(evaluation, name), per_view)
-
-
-def _rounded(seconds: Mapping[str, float]) -> dict[str, float]:
-    return {stage: round(value, 3) for stage, value in seconds.items() if math.isfinite(value)}
+    per_view = {view.name: min(getattr(view, name), BEST_PSNR) for view in evaluation.views}
+    return Figure(min(getattr(evaluation, name), BEST_PSNR), per_view)

@@ -28,6 +28,11 @@ class Supervisor:
         # The thread lives as long as the child: on Linux a parent's death is that of its thread.
         self._thread = threading.Thread(target=self._run, name="worker supervisor", daemon=True)
 
+    @property
+    def pid(self) -> int | None:
+        """The child's, once there is one."""
+        return self._process.pid if self._process else None
+
     def start(self) -> None:
         self._thread.start()
 

@@ -1,5 +1,7 @@
 """Reports are thinned out."""
 
+from itertools import pairwise
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,7 +14,7 @@ TIMES = st.lists(st.floats(0, 10), min_size=1, max_size=50).map(sorted)
 def test_values_pass_at_least_an_interval_apart(times: list[float]) -> None:
     throttle = Throttle[float](0.5)
     passed = [time for time in times if throttle.offer(time, time) is not None]
-    assert all(later - earlier >= 0.5 for earlier, later in zip(passed, passed[1:], strict=False))
+    assert all(later - earlier >= 0.5 for earlier, later in pairwise(passed))
     assert passed[0] == times[0]
 
 

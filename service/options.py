@@ -1,6 +1,5 @@
 """What a person may choose for a conversion; the same words in the API's form and on the command line."""
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -29,7 +28,7 @@ class Options:
         downscale: photos are reduced by this whole factor, 1 to 16.
         max_size_px: photos are reduced to this longest side at most, 16 to 20000; None for no bound.
         background: sRGB in [0, 1], behind the transparent pixels of photos.
-        overrides: settings that replace the preset's.
+        overrides: settings that replace the preset's; numbers may be text.
 
     Raises:
         UnknownPreset, OptionInvalid
@@ -44,6 +43,8 @@ class Options:
     overrides: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if "preset" in self.overrides:
+            raise OptionInvalid("setting preset", "must be given as the preset", repr(self.overrides["preset"]))
         settings_for(self.preset, **self.overrides)
         if not DEVICE.fullmatch(self.device):
             raise OptionInvalid("device", "must be auto, cpu, cuda or cuda:N", repr(self.device))
@@ -96,11 +97,8 @@ def _color(text: str) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def _assignment(text: str) -> tuple[str, Any]:
+def _assignment(text: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not equals or not name.isidentifier():
         raise OptionInvalid("setting", "must be written name=value", repr(text[:80]))
-    try:
-        return name, json.loads(value)
-    except ValueError:
-        return name, value  # a plain word needs no quotes
+    return name, value

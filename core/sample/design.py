@@ -45,7 +45,7 @@ def design_of(seed: int) -> Design:
         _linear(0.095, 0.42, 0.82),
         _linear(0.07, 0.62, 0.36),
         _linear(0.035, 0.62, 0.50),
-        np.array([0.95, 0.46, 0.24]),  # copper's normal reflectance
+        np.array([0.93, 0.38, 0.18]),  # copper's normal reflectance
         _linear(0.27 + tone, 0.62, 0.46),
         _linear(petal, 0.24, 0.99),
         _linear(petal, 0.72, 0.86),

@@ -1,0 +1,49 @@
+"""Published captures, where they are at hand: POLYFIELD_DATA, or ../shared/data beside the repository."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core.datasets import check_capture, read_capture
+from core.errors import ImageMissing
+
+DATA = Path(os.environ.get("POLYFIELD_DATA", Path(__file__).parents[4] / "shared/data"))
+
+
+def capture_folder(name: str) -> Path:
+    folder = DATA / name
+    if not folder.is_dir():
+        pytest.skip(f"{folder} is not there; set POLYFIELD_DATA to a folder with {name}")
+    return folder
+
+
+def test_lego_is_read_whole():
+    capture = read_capture(capture_folder("lego_100"))
+    assert (len(capture.train), len(capture.test)) == (100, 25)
+    assert capture.has_alpha
+    assert capture.train[0].camera.focal_px == pytest.approx((138.8889,) * 2, abs=1e-3)
+
+
+def test_lego_scaled_down_equals_the_published_scale():
+    small = read_capture(capture_folder("lego_400"), downscale=4)
+    published = read_capture(capture_folder("lego_100"))
+    for ours, theirs in zip(small.test[:5], published.test[:5], strict=True):
+        difference = ours.over((1, 1, 1)) - theirs.over((1, 1, 1))
+        # Both went through 8 bits twice; straight colours at thin alpha round coarsely, but hardly show.
+        assert np.abs(difference).max() < 3 / 255
+
+
+def test_fox_names_photos_that_it_lacks():
+    with pytest.raises(ImageMissing, match="17 missing"):
+        check_capture(capture_folder("fox"))
+
+
+def test_fox_is_undistorted():
+    capture = read_capture(capture_folder("fox"), max_size_px=120, skip_missing=True)
+    assert (len(capture.train), len(capture.test)) == (43, 7)
+    assert "17 photos" in capture.notes[0]
+    camera = capture.train[0].camera
+    # A mild lens: the pinhole photo keeps the field of view to within a few percent.
+    assert 2 * np.arctan(camera.size_px[0] / 2 / camera.focal_px[0]) == pytest.approx(0.748, rel=0.05)

@@ -64,7 +64,7 @@ def convert(
     stages = Stages(progress)
     settings = settings_for(preset, **(overrides or {}))
     device = resolve_device(device)
-    photos = {"downscale": downscale, "max_size_px": max_size_px, "background": background}
+    photos: dict[str, Any] = {"downscale": downscale, "max_size_px": max_size_px, "background": background}
     with stages.stage("read", READ), opened_capture(capture_path) as source:
         capture = read_capture(source, **photos)
     trained = reconstruct(

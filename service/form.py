@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 from python_multipart.exceptions import FormParserError
 from python_multipart.multipart import MultipartParser, parse_options_header
@@ -13,6 +13,9 @@ from core.errors import UploadTooLarge
 from service.errors import RequestInvalid
 from service.names import safe_relative_path
 from service.settings import MIB, Limits
+
+if TYPE_CHECKING:
+    from python_multipart.multipart import MultipartCallbacks
 
 SHRINK = "Send fewer or smaller photos."
 
@@ -81,7 +84,7 @@ class _Receiver:
         self._received = 0
         self._ended = False
         self._file: IO[bytes] | None = None
-        self._part_bytes = 0
+        self._header_name, self._header_value = bytearray(), bytearray()
         self._begin_part()
         self._parser = _parser(boundary, self)
 
@@ -148,8 +151,8 @@ class _Receiver:
 
     def _begin_part(self) -> None:
         self._part_bytes = 0
-        self._name, self._disposition = "", b""
-        self._header_name, self._header_value, self._value = bytearray(), bytearray(), bytearray()
+        self._name, self._disposition, self._value = "", b"", bytearray()
+        self._header_name, self._header_value = bytearray(), bytearray()
 
     def _open(self, name: str) -> None:
         if len(self._form.files) >= self._limits.files:
@@ -166,17 +169,17 @@ class _Receiver:
 
 
 def _parser(boundary: bytes, receiver: _Receiver) -> MultipartParser:
-    names = (
-        "on_part_begin",
-        "on_header_field",
-        "on_header_value",
-        "on_header_end",
-        "on_headers_finished",
-        "on_part_data",
-        "on_part_end",
-        "on_end",
-    )
+    callbacks: MultipartCallbacks = {
+        "on_part_begin": receiver.on_part_begin,
+        "on_header_field": receiver.on_header_field,
+        "on_header_value": receiver.on_header_value,
+        "on_header_end": receiver.on_header_end,
+        "on_headers_finished": receiver.on_headers_finished,
+        "on_part_data": receiver.on_part_data,
+        "on_part_end": receiver.on_part_end,
+        "on_end": receiver.on_end,
+    }
     try:
-        return MultipartParser(boundary, {name: getattr(receiver, name) for name in names})  # type: ignore[misc]
+        return MultipartParser(boundary, callbacks)
     except FormParserError as error:
         raise RequestInvalid("Content-Type", "must have a usable boundary", str(error)[:120]) from None

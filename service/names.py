@@ -45,7 +45,7 @@ def _fault(name: str) -> str:
         return "an absolute name"
     if "\\" in name:
         return "a backslash"
-    if DRIVE.match(name):
+    if DRIVE.match(parts[0]):
         return "a drive letter"
     if ".." in parts:
         return "'..'"

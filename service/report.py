@@ -3,7 +3,9 @@
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, TypeAlias
+
+ByteString: TypeAlias = bytes  # Report has a field of that name
 
 
 @dataclass(frozen=True)
@@ -46,18 +48,16 @@ class Report:
     views: Mapping[str, int]
     notes: tuple[str, ...]
 
-    def as_json(self) -> dict[str, Any]:
-        return asdict(self)
-
     @classmethod
-    def from_json(cls, value: Mapping[str, Any]) -> "Report":
-        """The reverse of `as_json`."""
+    def from_bytes(cls, data: ByteString) -> "Report":
+        """The reverse of `as_bytes`."""
+        value = json.loads(data)
         figures = {name: Figure(**value[name]) for name in ("psnr", "ssim")}
         return cls(**{**value, **figures, "notes": tuple(value["notes"])})
 
-    def as_bytes(self) -> bytes:
+    def as_bytes(self) -> ByteString:
         """report.json."""
-        return json.dumps(self.as_json(), indent=2, allow_nan=False).encode()
+        return json.dumps(asdict(self), indent=2, allow_nan=False).encode()
 
     def as_table(self) -> str:
         """For a terminal."""

@@ -1,6 +1,7 @@
 """Arguments that several commands share."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from service.options import Options
@@ -48,5 +49,5 @@ def add_service(parser: argparse.ArgumentParser) -> None:
 
 
 def settings_of(arguments: argparse.Namespace, worker_id: str = "") -> ServiceSettings:
-    named = {"worker_id": worker_id} if worker_id else {}
-    return ServiceSettings(data=arguments.data, database_url=arguments.database_url, **named)
+    settings = ServiceSettings(data=arguments.data, database_url=arguments.database_url)
+    return replace(settings, worker_id=worker_id) if worker_id else settings

@@ -20,6 +20,7 @@ import httpx
 from core.errors import PolyfieldError
 from service.commands.common import add_options, form_words
 from service.commands.progress_bar import ProgressBar
+from service.report import Report
 
 OUT = Path("out") / "demo"
 ARTIFACTS = ("scene.glb", "preview.png", "report.json")
@@ -48,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"job      {client.base_url}jobs/{job['id']}", flush=True)
             _follow(client, job["id"])
             _download(client, job["id"], arguments.out)
-    print(_table(json.loads((arguments.out / "report.json").read_bytes())))
+    print(Report.from_bytes((arguments.out / "report.json").read_bytes()).as_table())
     print(f"written to {arguments.out}")
     return 0
 
@@ -157,9 +158,3 @@ def _download(client: httpx.Client, job_id: str, folder: Path) -> None:
 
 def _refused(problem: dict[str, Any]) -> DemoFailed:
     return DemoFailed("job", "must succeed", f"{problem.get('code', 'unknown')}: {problem.get('detail', '')}")
-
-
-def _table(report: dict[str, Any]) -> str:
-    from service.report import Report
-
-    return Report.from_json(report).as_table()

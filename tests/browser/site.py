@@ -63,7 +63,8 @@ class _Requests(BaseHTTPRequestHandler):
         self.send_response(status)
         self.send_header("Content-Type", media_type)
         self.send_header("Content-Length", str(len(content)))
-        self.send_header("Cache-Control", "no-store")
+        # What is the same for every test may be kept: three.js is most of what a page loads.
+        self.send_header("Cache-Control", "max-age=3600" if path.startswith("/vendor/") else "no-store")
         self.end_headers()
         self.wfile.write(content)
 

@@ -83,7 +83,7 @@ def test_save_picture_downloads_a_png(viewer: ViewerPage) -> None:
     with viewer.page.expect_download() as download:
         viewer.page.get_by_role("button", name="Save picture").click()
     assert download.value.suggested_filename == "scene.png"
-    assert Image.open(download.value.path()).size == (960, 800)
+    assert Image.open(download.value.path()).size == (480, 480)
 
 
 def test_file_without_the_extension_is_shown_plainly_with_a_note(page: Page, site: Site, scene: BakedScene) -> None:
@@ -108,6 +108,7 @@ def test_picked_file_is_shown(page: Page, site: Site, scene: BakedScene) -> None
 @pytest.mark.parametrize("content", [b"", b"not a glb at all", b"glTF\x02\x00\x00\x00\xff\xff\xff\xff"])
 def test_file_that_is_not_a_glb_is_refused_with_a_message(page: Page, site: Site, content: bytes) -> None:
     page.goto(f"{site.url}/viewer.html")
+    page.evaluate("polyfield.ready")
     page.set_input_files("#pick-glb", {"name": "wrong.glb", "mimeType": "model/gltf-binary", "buffer": content})
     expect(page.locator("#message")).to_contain_text("cannot be shown")
 

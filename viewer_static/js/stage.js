@@ -11,7 +11,9 @@ import { PlainRenderer } from "./plain-renderer.js";
 const RENDERERS = { deferred: DeferredRenderer, forward: ForwardRenderer, plain: PlainRenderer };
 // Full resolution up to this many pixels; beyond it a phone gets warm and nobody sees the difference.
 const COMFORTABLE_PX = 2.2e6;
-const MEASURED_FRAMES = 20; // drawn when the work per frame changes, so that there is a figure to show
+// Drawn when the work per frame changes, so that there is a figure to show; fewer where they take long.
+const MEASURED_FRAMES = 20;
+const MEASURED_MS = 400;
 
 /** Draws only when something changed, or always while `continuous`. */
 export class Stage {
@@ -23,7 +25,8 @@ export class Stage {
   #mode = "plain";
   #scale = 1;
   #background = null;
-  #pendingFrames = 0;
+  #unmeasured = 0;
+  #measureUntil = 0;
   #requested = false;
   #continuous = false;
   #clock = new FrameClock();
@@ -129,13 +132,16 @@ export class Stage {
   resetTimes() {
     this.#clock.reset();
     this.#gpu.reset();
-    this.draw(MEASURED_FRAMES);
+    this.#unmeasured = MEASURED_FRAMES;
+    this.#measureUntil = performance.now() + MEASURED_MS;
+    this.draw();
   }
 
-  /** Asks for frames. */
-  draw(frames = 1) {
-    this.#pendingFrames = Math.max(this.#pendingFrames, frames);
-    this.#schedule();
+  /** Asks for a frame. */
+  draw() {
+    if (this.#requested) return;
+    this.#requested = true;
+    requestAnimationFrame((now) => this.#frame(now));
   }
 
   /** Draws at once, so that the canvas can be read in the same task. */
@@ -146,22 +152,17 @@ export class Stage {
     if (this.#gltf) this.rendererOf(this.#mode).render(this.rig.camera, null, width, height);
   }
 
-  #schedule() {
-    if (this.#requested) return;
-    this.#requested = true;
-    requestAnimationFrame((now) => this.#frame(now));
-  }
-
   #frame(now) {
     this.#requested = false;
-    this.#pendingFrames -= 1;
+    this.#unmeasured -= 1;
     this.#clock.tick(now);
     this.#gpu.begin();
     this.drawNow();
     this.#gpu.end();
     this.onFrame();
     // Damped motion asks for its next frame itself, through the rig's change event.
-    if (this.#continuous || this.#pendingFrames > 0) this.#schedule();
+    const measuring = this.#unmeasured > 0 && performance.now() < this.#measureUntil;
+    if (this.#continuous || measuring) this.draw();
     else if (!this.#requested) this.#clock.pause();
   }
 

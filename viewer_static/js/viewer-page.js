@@ -5,7 +5,7 @@ import { hideMessage, showLoading, showMessage } from "./message.js";
 import { hasWebGL2 } from "./webgl2.js";
 
 const byId = (id) => document.getElementById(id);
-let viewer = null;
+let viewer = null; // a promise, once WebGL2 is there
 
 /** For tests and measurements; `ready` resolves when the address's asset is on the stage. */
 window.polyfield = { ready: start() };
@@ -21,7 +21,7 @@ async function start() {
     });
     return;
   }
-  viewer = await makeViewer();
+  viewer = makeViewer();
   listenForFiles();
   const source = sourceOfAddress();
   if (source) await show(source);
@@ -48,12 +48,12 @@ async function makeViewer() {
 async function show(source) {
   showLoading(NaN);
   try {
-    const bytes = await source.read(showLoading);
+    const [{ stage, hud, loadGlb }, bytes] = await Promise.all([viewer, source.read(showLoading)]);
     showLoading(NaN);
-    const gltf = await viewer.loadGlb(bytes);
+    const gltf = await loadGlb(bytes);
     hideMessage();
-    viewer.stage.setAsset(gltf);
-    viewer.hud.setAsset(source, bytes.byteLength);
+    stage.setAsset(gltf);
+    hud.setAsset(source, bytes.byteLength);
   } catch (error) {
     showMessage({ title: "This asset cannot be shown", text: [error.message, error.remedy].filter(Boolean).join("\n") });
   } finally {

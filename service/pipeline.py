@@ -31,12 +31,14 @@ def register_pipeline(settings: ServiceSettings) -> None:
     async def train(job_id: str) -> dict[str, Any] | None:
         folder = JobFolder(settings.jobs / job_id)
         try:
+            log.info("job %s: starts", job_id)
             problem = await run_trainer(
                 settings.trainer, folder, lambda report: publish(folder, report), settings.stall_s
             )
         except Exception as error:
             log.warning("job %s: %s", job_id, error)
             raise
+        log.info("job %s: %s", job_id, f"refused, {problem['code']}" if problem else "done")
         if problem:
             folder.drop_inputs()
         else:

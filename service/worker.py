@@ -62,6 +62,7 @@ def _on_signals(stopping: threading.Event) -> None:
 
 
 def _launch(settings: ServiceSettings) -> None:
+    logging.getLogger("dbos").addFilter(_without_traceback)
     DBOS(
         config={
             "name": APPLICATION,
@@ -76,6 +77,14 @@ def _launch(settings: ServiceSettings) -> None:
     DBOS.listen_queues([QUEUE])
     DBOS.launch()
     DBOS.register_queue(QUEUE, worker_concurrency=1, polling_interval_sec=settings.poll_s, on_conflict="always_update")
+
+
+def _without_traceback(record: logging.LogRecord) -> bool:
+    # Fifty lines of the engine's inside for every job that is cancelled or crashes; the trainer's log has the reason.
+    if record.exc_info and record.exc_info[1] is not None:
+        record.msg, record.args = f"{record.getMessage()} {record.exc_info[1]}", ()
+    record.exc_info = record.exc_text = None
+    return True
 
 
 def _attend(settings: ServiceSettings, lock: WorkerLock, stopping: threading.Event) -> None:

@@ -29,6 +29,7 @@ class Scene:
     palette: wp.array(dtype=wp.vec3)
     seed: wp.int32
     rays: wp.int32
+    table_z: wp.float32
 
 
 @wp.struct
@@ -139,20 +140,20 @@ def waves(u: wp.float32, v: wp.float32):
 def glaze(scene: Scene, hit: Hit):
     """From below: bare clay, waves on cream, a gold line, and a dark glaze that has run down."""
     angle = hit.uv[0] * 6.2831853
-    z = hit.position[2]
+    z = hit.position[2] - scene.table_z
     around = wp.vec3(wp.cos(angle) * 2.2, wp.sin(angle) * 2.2, 3.0)
     drip = wp.max(noise(scene, around * 1.6), 0.0)
     line = z + 0.17 * drip + 0.02 * noise(scene, around * 0.7)
-    ink = waves(hit.uv[0] * 48.0, (z + 0.52) * 13.0)
+    ink = waves(hit.uv[0] * 48.0, z * 13.0)
     colour = mix(scene.palette[2], scene.palette[0] * 1.15, ink * 0.9)
     speckle = noise(scene, hit.position * 45.0)
-    dark = mix(scene.palette[0], scene.palette[1], smooth_step(0.02, -0.10, line) * 0.85)
+    dark = mix(scene.palette[0], scene.palette[1], smooth_step(0.54, 0.42, line) * 0.85)
     dark = mix(dark, scene.palette[1], smooth_step(0.35, 0.6, speckle) * 0.7)
-    colour = mix(colour, dark, smooth_step(-0.160, -0.152, line))
-    rim = soft_window(line + 0.160, 0.007, 0.004)
+    colour = mix(colour, dark, smooth_step(0.360, 0.368, line))
+    rim = soft_window(line - 0.360, 0.007, 0.004)
     colour = mix(colour, wp.vec3(0.75, 0.42, 0.12), rim)
     clay = wp.vec3(0.36, 0.19, 0.11) * (0.9 + 0.3 * speckle)
-    return mix(clay, colour, smooth_step(-0.478, -0.470, z))
+    return mix(clay, colour, smooth_step(0.042, 0.050, z))
 
 
 @wp.func

@@ -25,7 +25,7 @@ from core.sample.kernels import (
 from core.sample.mesh import Mesh, joined
 from core.sample.shapes import ball, lathe, leaf, resampled, smooth_curve, tube
 
-TABLE_Z = -0.52
+TABLE_Z = -0.44
 
 
 def still_life(design: Design) -> Mesh:
@@ -62,13 +62,13 @@ def _table() -> Mesh:
     parts.append(lathe(resampled(apron, 0.02), TURNED_WOOD, 96))
     for angle in np.arange(4) * np.pi / 2 + 0.4:
         outward = np.array([np.cos(angle), np.sin(angle), 0.0])
-        foot = outward * 0.80 + [0, 0, -1.06]
+        foot = outward * 0.80 + [0, 0, z - 0.54]
         top = outward * 0.64 + [0, 0, z - 0.10]
         path = np.linspace(top, foot, 40)
         parts.append(tube(path, _turning(np.linspace(0, 1, 40)), TURNED_WOOD, 14))
         parts.append(ball(foot, 0.036, COPPER, 14))
     angle = np.linspace(0, 2 * np.pi, 97)
-    ring = np.stack([0.735 * np.cos(angle), 0.735 * np.sin(angle), np.full(97, -0.84)], -1)
+    ring = np.stack([0.735 * np.cos(angle), 0.735 * np.sin(angle), np.full(97, z - 0.32)], -1)
     parts.append(tube(ring, 0.016, COPPER, 10))
     return joined(parts)
 

@@ -11,7 +11,7 @@ import warp as wp
 from core.camera import Camera
 from core.sample import kernels
 from core.sample.design import design_of
-from core.sample.still_life import still_life
+from core.sample.still_life import TABLE_Z, still_life
 
 SUBSAMPLES = 3  # 9 samples a pixel: a twig of 1.5 px keeps its coverage to within a few percent
 LIGHTS = 192  # directional lights that stand for the studio; shadows are this many overlapping steps, seen as soft
@@ -38,7 +38,7 @@ class Studio:
         scene.material = wp.array(mesh.material, dtype=wp.int32, device=DEVICE)
         scene.light = wp.zeros(len(mesh.positions), dtype=wp.vec3, device=DEVICE)
         scene.palette = wp.array(design.palette, dtype=wp.vec3, device=DEVICE)
-        scene.seed, scene.rays = design.seed, design.rays
+        scene.seed, scene.rays, scene.table_z = design.seed, design.rays, TABLE_Z
         self._scene = scene
         self._light(lights)
 

@@ -1,7 +1,7 @@
 """The sample is reproducible, readable, and as difficult as it claims to be."""
 
 import json
-from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -20,6 +20,14 @@ SIZE = {"size_px": 24, "train_views": 3, "test_views": 2}
 
 def files_of(folder):
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_lights():
+    """Light takes most of a tiny sample's time, and its quality does not matter here."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("core.sample.capture_writer.Studio", partial(Studio, lights=12))
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -89,17 +97,20 @@ def test_normals_are_unit_and_finite():
     assert mesh.faces.max() < len(mesh.positions)
 
 
-def test_highlights_move_with_the_view(studio):
-    # The window's reflection: a point on the glaze, seen from two sides, differs by more than matt paint could.
-    seen = []
-    for camera in orbit_cameras(12, 48, 0):
-        photo = studio.photo(camera)
-        to_camera = np.array([-0.22, -0.10, -0.05]) - camera.position
-        local = camera.world_from_camera[:3, :3].T @ to_camera
-        x = camera.centre_px[0] - camera.focal_px[0] * local[0] / local[2]
-        y = camera.centre_px[1] + camera.focal_px[1] * local[1] / local[2]
-        seen.append(photo[int(y) - 3 : int(y) + 4, int(x) - 3 : int(x) + 4, :3].max((0, 1)).min())
-    assert max(seen) - min(seen) > 0.2
+def test_some_of_the_surface_changes_with_the_view_and_most_does_not(studio):
+    first, second = orbit_cameras(14, 96, 0)[:2]
+    points = first.position + studio.depth(first)[..., None] * first.directions(first.pixel_centres())
+    points, colours = points[np.isfinite(points[..., 0])], studio.photo(first)[np.isfinite(points[..., 0])]
+    local = (points - second.position) @ second.world_from_camera[:3, :3]
+    x = (second.centre_px[0] - second.focal_px[0] * local[:, 0] / local[:, 2]).astype(int)
+    y = (second.centre_px[1] + second.focal_px[1] * local[:, 1] / local[:, 2]).astype(int)
+    distance = np.linalg.norm(points - second.position, axis=1)
+    both = (np.abs(studio.depth(second)[y, x] - distance) < 0.02) & (colours[:, 3] == 1)
+    change = np.abs(studio.photo(second)[y, x] - colours)[both, :3].max(1)
+    assert both.sum() > 500
+    # Matt texture moves by a fraction of a pixel only; the window's reflection goes from blue to white.
+    assert np.median(change) < 0.1
+    assert np.quantile(change, 0.98) > 0.3
 
 
 def test_photo_is_premultiplied(studio):
@@ -118,7 +129,7 @@ def test_depth_is_that_of_the_photo(studio):
 
 
 def test_depth_equals_the_nearest_triangle_by_brute_force(studio):
-    camera = replace(hemisphere_cameras(4, 8, 0)[2])
+    camera = hemisphere_cameras(4, 8, 0)[2]
     mesh, depth = still_life(design_of(0)), studio.depth(camera)
     directions = camera.directions(camera.pixel_centres())
     a, b, c = (mesh.positions[mesh.faces[:, corner]] for corner in range(3))
@@ -131,7 +142,8 @@ def test_depth_equals_the_nearest_triangle_by_brute_force(studio):
             q = np.cross(camera.position - a, b - a)
             v = q @ directions[row, column] * inverse
             t = np.einsum("ij,ij->i", c - a, q) * inverse
-        hits = t[(u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)]
+            # A ray parallel to a triangle, or a triangle without area, gives NaN, which no comparison lets through.
+            hits = t[(u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)]
         # float32 over a distance of four units.
         np.testing.assert_allclose(depth[row, column], hits.min(initial=np.inf), atol=1e-5)
 

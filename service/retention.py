@@ -11,6 +11,7 @@ from service.settings import ServiceSettings
 
 # An upload of the largest size over a slow line takes hours.
 UPLOAD_TIMEOUT_S = 24 * 3600
+DAY_S = 24 * 3600
 # A folder is there a moment before its row is.
 ORPHAN_AGE_S = 600
 
@@ -29,6 +30,18 @@ def sweep(settings: ServiceSettings, states: Mapping[str, str]) -> None:
     for path in settings.jobs.iterdir():
         if JOB_ID.fullmatch(path.name):
             _sweep_job(JobFolder(path), states.get(path.name))
+
+
+def expired(ended_ms: Mapping[str, int | None], keep_days: float | None, now_s: float) -> list[str]:
+    """The jobs that ended more than `keep_days` ago.
+
+    Args:
+        ended_ms: job to the time it ended, milliseconds since 1970; None while it has not.
+        now_s: seconds since 1970.
+    """
+    if keep_days is None:
+        return []
+    return [job for job, ended in ended_ms.items() if ended is not None and now_s - ended / 1e3 > keep_days * DAY_S]
 
 
 def _sweep_job(folder: JobFolder, state: str | None) -> None:

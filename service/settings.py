@@ -52,6 +52,7 @@ class ServiceSettings:
         takeover_s: how often a worker looks for jobs of workers that died.
         sweep_s: how often a worker removes what ended jobs left behind.
         poll_s: how often a worker looks for a new job.
+        keep_days: ended jobs are deleted after so many days, with their files; None keeps them.
     """
 
     data: Path = Path("data")
@@ -64,6 +65,7 @@ class ServiceSettings:
     takeover_s: float = 5.0
     sweep_s: float = 600.0
     poll_s: float = 0.5
+    keep_days: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "data", Path(self.data).resolve())

@@ -11,9 +11,10 @@ from dbos import DBOS
 
 from service.database import APPLICATION, PIPELINE_VERSION, QUEUE, prepare
 from service.errors import WorkerRunning
+from service.job_folder import JobFolder
 from service.liveness import WorkerLock, worker_lock
 from service.pipeline import register_pipeline
-from service.retention import sweep
+from service.retention import expired, sweep
 from service.settings import ServiceSettings
 
 # A predecessor that was just killed may take a moment to be gone.
@@ -96,7 +97,7 @@ def _attend(settings: ServiceSettings, lock: WorkerLock, stopping: threading.Eve
                 suspects = take_over(settings, suspects)
             if time.monotonic() - swept > settings.sweep_s:
                 swept = time.monotonic()
-                sweep(settings, _job_states())
+                _clean(settings)
         except Exception:  # the database may be away for a while
             log.exception("worker %s: will try again", settings.worker_id)
         if stopping.wait(settings.takeover_s):
@@ -126,5 +127,11 @@ def take_over(settings: ServiceSettings, suspects: set[str]) -> set[str]:
     return dead
 
 
-def _job_states() -> dict[str, str]:
-    return {row.workflow_id: row.status for row in DBOS.list_workflows(load_input=False, load_output=False)}
+def _clean(settings: ServiceSettings) -> None:
+    rows = DBOS.list_workflows(load_input=False, load_output=False)
+    old = expired({row.workflow_id: row.completed_at for row in rows}, settings.keep_days, time.time())
+    for job_id in old:
+        JobFolder(settings.jobs / job_id).remove()
+    if old:
+        DBOS.delete_workflows(old)
+    sweep(settings, {row.workflow_id: row.status for row in rows})

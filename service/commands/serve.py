@@ -18,6 +18,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--port", type=int, default=8000)
     add_service(parser)
     parser.add_argument("--no-worker", action="store_true", help="workers are started elsewhere")
+    parser.add_argument("--keep-days", type=float, help="delete ended jobs after so many days; default: never")
     parser.set_defaults(run=run)
 
 
@@ -51,4 +52,5 @@ def run(arguments: argparse.Namespace) -> int:
 def _worker_command(arguments: argparse.Namespace) -> list[str]:
     command = [sys.executable, "-m", "service.cli", "worker", "--data", str(arguments.data)]
     command += ["--database-url", arguments.database_url] if arguments.database_url else []
+    command += ["--keep-days", str(arguments.keep_days)] if arguments.keep_days is not None else []
     return [*command, "--parent", str(os.getpid())]

@@ -3,6 +3,7 @@
 import argparse
 import logging
 import signal
+from dataclasses import replace
 
 from service.commands.common import add_service, settings_of
 from service.parent import end_with_parent
@@ -12,6 +13,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser = subparsers.add_parser("worker", help="run jobs; `serve` starts one by itself")
     add_service(parser)
     parser.add_argument("--id", default="", help="name among the workers; default: the host's name and -0")
+    parser.add_argument("--keep-days", type=float, help="delete ended jobs after so many days; default: never")
     parser.add_argument("--parent", type=int, default=0, help=argparse.SUPPRESS)
     parser.set_defaults(run=run)
 
@@ -22,5 +24,5 @@ def run(arguments: argparse.Namespace) -> int:
     logging.basicConfig(level=logging.INFO, format="%(asctime)s worker %(levelname)s %(message)s")
     from service.worker import run_worker
 
-    run_worker(settings_of(arguments, arguments.id))
+    run_worker(replace(settings_of(arguments, arguments.id), keep_days=arguments.keep_days))
     return 0

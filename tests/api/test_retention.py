@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from service.job_folder import JobFolder
-from service.retention import ORPHAN_AGE_S, UPLOAD_TIMEOUT_S, sweep
+from service.retention import DAY_S, ORPHAN_AGE_S, UPLOAD_TIMEOUT_S, expired, sweep
 from service.settings import ServiceSettings
 
 JOB = "0" * 32
@@ -77,3 +77,10 @@ def test_only_old_uploads_go(settings: ServiceSettings) -> None:
     age(settings.incoming / "old", UPLOAD_TIMEOUT_S + 60)
     sweep(settings, {})
     assert [path.name for path in settings.incoming.iterdir()] == ["new"]
+
+
+def test_jobs_expire_a_number_of_days_after_their_end() -> None:
+    now_s = 1e9
+    ended = {"old": int((now_s - 8 * DAY_S) * 1e3), "new": int((now_s - 6 * DAY_S) * 1e3), "running": None}
+    assert expired(ended, 7, now_s) == ["old"]
+    assert expired(ended, None, now_s) == []

@@ -1,0 +1,182 @@
+"""From a capture to a baked scene: the three training stages in turn, then baking."""
+
+import hashlib
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import nn
+
+from core.baked import BakedScene
+from core.baking.bake import bake, quick_bake
+from core.baking.preview import preview_of_field, preview_of_scene
+from core.capture import Capture
+from core.checkpoint import CheckpointFile
+from core.device import resolve_device
+from core.field.network import new_network
+from core.field.region import Region, find_region
+from core.presets import Settings
+from core.progress import Progress, ProgressCallback, ignore_progress
+from core.training.field_stage import FieldStage
+from core.training.pixels import PixelPool
+from core.training.stage import Stage
+from core.training.texel_stage import TexelStage
+from core.training.voxel_stage import VoxelStage
+
+# The stages' shares of the time, for the progress bar; measured on two cores with the balanced preset.
+STAGE_SHARES = {"voxels": 0.35, "field": 0.30, "texels": 0.30, "bake": 0.05}
+REPORT_INTERVAL_S = 0.5
+PREVIEW_INTERVAL_S = 20.0
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """Attributes:
+    scene: what to export.
+    seconds: per stage (voxels, field, texels, bake), including what an interrupted run spent on them.
+    resumed: whether the run went on from a checkpoint.
+    """
+
+    scene: BakedScene
+    seconds: dict[str, float]
+    resumed: bool
+
+
+def reconstruct(
+    capture: Capture,
+    settings: Settings,
+    *,
+    device: str = "auto",
+    seed: int = 0,
+    checkpoint_dir: Path | None = None,
+    progress: ProgressCallback = ignore_progress,
+) -> Reconstruction:
+    """Trains and bakes a capture (paper 3.1 to 3.3).
+
+    The same capture, settings, seed and device give the same scene. With a checkpoint folder, a run that was cut off
+    goes on from its last checkpoint; the checkpoint of a finished run is removed.
+
+    Raises:
+        CaptureEmpty, TrainingFailed, CheckpointInvalid, OptionInvalid
+    """
+    resolved = resolve_device(device)
+    run = _Run(capture, settings, resolved, seed, checkpoint_dir, progress)
+    with _one_torch_thread(resolved):
+        return run.reconstruction()
+
+
+@contextmanager
+def _one_torch_thread(device: str) -> Iterator[None]:
+    """On the CPU, torch's thread pool spins against the kernels' threads: a 3 ms network then takes up to 300 ms."""
+    threads = torch.get_num_threads()
+    if device == "cpu":
+        torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+class _Run:
+    """One reconstruction under way."""
+
+    def __init__(
+        self,
+        capture: Capture,
+        settings: Settings,
+        device: str,
+        seed: int,
+        checkpoint_dir: Path | None,
+        progress: ProgressCallback,
+    ) -> None:
+        self.capture, self.settings, self.device, self.seed = capture, settings, device, seed
+        self.region: Region = find_region(capture)
+        self.network: nn.Sequential = new_network(seed).to(device)
+        self._progress = progress
+        self._checkpoint = CheckpointFile(checkpoint_dir, _identity(capture, settings, seed))
+        self._seconds: dict[str, float] = {}
+        self._reported_at = self._previewed_at = time.monotonic()
+
+    def reconstruction(self) -> Reconstruction:
+        saved = self._checkpoint.read()
+        stage_name, state = saved or ("voxels", None)
+        if state is not None:
+            self._seconds = dict(state["seconds"])
+        pool = PixelPool(self.capture.train, self.region.frame, self.device, seed=self.seed)
+        common = self.network, self.settings, self.seed, self.device
+        if stage_name == "voxels":
+            voxels = VoxelStage(self.capture, self.region, *common)
+            self._train(voxels, state)
+            field = FieldStage.after(voxels, pool)
+            del voxels
+            state = None
+        elif stage_name == "field":
+            assert state is not None
+            field = FieldStage.restored(pool, state, *common)
+        if stage_name in ("voxels", "field"):
+            self._train(field, None)
+            texels = TexelStage.after(field, pool)
+            del field
+        else:
+            assert state is not None
+            texels = TexelStage.restored(pool, state, *common)
+        self._train(texels, None)
+        scene = self._baked(texels)
+        self._checkpoint.remove()
+        return Reconstruction(scene, self._seconds, resumed=saved is not None)
+
+    def _train(self, stage: Stage, state: dict[str, Any] | None) -> None:
+        if state is not None:
+            stage.restore(state)
+        before, start = self._seconds.get(stage.name, 0.0), time.monotonic()
+        while stage.done < stage.steps:
+            stage.advance()
+            self._seconds[stage.name] = before + time.monotonic() - start
+            self._report(stage)
+            if self._checkpoint.due():
+                self._checkpoint.write(stage.name, {**stage.state(), "seconds": self._seconds})
+
+    def _baked(self, texels: TexelStage) -> BakedScene:
+        start = time.monotonic()
+        scene = bake(texels, self.capture, self.region.frame, lambda share: self._tell("bake", share, texels.psnr))
+        self._seconds["bake"] = time.monotonic() - start
+        return scene
+
+    def _report(self, stage: Stage) -> None:
+        now = time.monotonic()
+        if now - self._reported_at < REPORT_INTERVAL_S and stage.done < stage.steps:
+            return
+        self._reported_at = now
+        preview = None
+        if now - self._previewed_at >= PREVIEW_INTERVAL_S:
+            preview = self._preview(stage)
+            self._previewed_at = time.monotonic()
+        self._tell(stage.name, stage.fraction, stage.psnr, preview)
+
+    def _tell(self, name: str, share: float, psnr: float | None, preview: Any = None) -> None:
+        names = list(STAGE_SHARES)
+        before = sum(STAGE_SHARES[earlier] for earlier in names[: names.index(name)])
+        self._progress(Progress(name, min(before + STAGE_SHARES[name] * share, 1.0), psnr, preview))
+
+    def _preview(self, stage: Stage) -> Any:
+        camera = (self.capture.test or self.capture.train)[0].camera
+        background = self.capture.background
+        if isinstance(stage, TexelStage):
+            scene = quick_bake(stage, self.capture, self.region.frame)
+            return preview_of_scene(scene, camera, self.device)
+        if isinstance(stage, VoxelStage):
+            return preview_of_field(stage.field, self.network, camera, self.region.frame, background, self.device)
+        return None
+
+
+def _identity(capture: Capture, settings: Settings, seed: int) -> dict[str, Any]:
+    digest = hashlib.sha256()
+    for view in capture.train:
+        digest.update(view.image_u8.tobytes())
+        digest.update(view.camera.world_from_camera.tobytes())
+        digest.update(str((view.camera.focal_px, view.camera.centre_px)).encode())
+    return {"settings": asdict(settings), "seed": seed, "capture": digest.hexdigest()}

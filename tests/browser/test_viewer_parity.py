@@ -11,7 +11,7 @@ from tests.browser.conftest import open_scene
 from tests.browser.site import Site
 from tests.browser.viewer import ViewerPage
 from tests.parity.compare import compare, pixels_with_edges
-from tests.scenes import random_scene
+from tests.scenes import look_at_camera, random_scene
 
 # Rounding to 8 bits alone gives 59 dB; a wrong direction, a wrong texel row or altered bytes less than 40.
 INTERIOR_DB = 45.0
@@ -47,6 +47,13 @@ def test_loose_intersecting_quads_match_the_reference(page: Page, site: Site) ->
     viewer = open_scene(page, site, loose)
     for mode in MODES:
         assert_equal_but_for_edges(viewer, loose, 0, mode)
+
+
+def test_camera_that_is_not_in_the_asset_matches_the_reference(viewer: ViewerPage, scene: BakedScene) -> None:
+    camera = look_at_camera("elsewhere", (-0.9, -1.8, -0.7), size_px=(120, 90))
+    actual = viewer.render(camera, "deferred", camera.size_px)
+    comparison = compare(actual, render_deferred(scene, camera), pixels_with_edges(scene, camera))
+    assert comparison.interior_psnr >= INTERIOR_DB, str(comparison)
 
 
 def test_another_size_scales_the_view(viewer: ViewerPage, scene: BakedScene) -> None:

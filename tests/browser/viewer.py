@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from playwright.sync_api import Page
 
+from core.camera import Camera
+
 # Bytes cross from the page as base64: a list of numbers takes seconds for a picture.
 TO_BASE64 = """
 const toBase64 = (bytes) => {
@@ -23,18 +25,19 @@ class ViewerPage:
 
     page: Page
 
-    def render(self, view: int, mode: str, size_px: tuple[int, int]) -> np.ndarray:
-        """[height, width, 4] float64 in [0, 1], premultiplied by coverage, of a view of the asset.
+    def render(self, view: int | Camera, mode: str, size_px: tuple[int, int]) -> np.ndarray:
+        """[height, width, 4] float64 in [0, 1], premultiplied by coverage.
 
         Args:
-            view: index among the asset's views.
+            view: index among the asset's views, or a camera in the object frame.
             mode: deferred, forward or plain.
             size_px: (width, height).
         """
         width, height = size_px
+        which = view if isinstance(view, int) else _as_view(view)
         script = f"async ([view, mode, width, height]) => {{ {TO_BASE64} return toBase64(\
 await polyfield.renderToPixels(view, mode, width, height)); }}"
-        data = self.page.evaluate(script, [view, mode, width, height])
+        data = self.page.evaluate(script, [which, mode, width, height])
         return _bytes(data).reshape(height, width, 4) / 255.0
 
     def feature_texture(self, page: int, half: int) -> np.ndarray:
@@ -73,6 +76,16 @@ def collect_errors(page: Page) -> list[str]:
 
     page.on("console", on_console)
     return errors
+
+
+def _as_view(camera: Camera) -> dict[str, Any]:
+    """A camera as the asset's extension describes it."""
+    return {
+        "imageSize": list(camera.size_px),
+        "focalLength": list(camera.focal_px),
+        "principalPoint": list(camera.centre_px),
+        "objectFromCamera": camera.world_from_camera.T.ravel().tolist(),
+    }
 
 
 def _bytes(data: str) -> np.ndarray:

@@ -11,19 +11,20 @@ export class PixelProbe {
   }
 
   /**
-   * Renders one of the asset's views.
+   * Renders a view.
    *
-   * @param {number} viewIndex
+   * @param {number | object} which index among the asset's views, or a view as the extension describes it
    * @param {"deferred" | "forward" | "plain"} mode
    * @param {number} width in pixels
    * @param {number} height
    * @returns {Promise<Uint8Array>} RGBA, top row first, premultiplied by coverage
    */
-  async renderToPixels(viewIndex, mode, width, height) {
+  async renderToPixels(which, mode, width, height) {
     const { gltf, webgl, rig } = this.#stage;
     const { views, parts } = gltf.neural;
-    const position = new Vector3().setFromMatrixPosition(worldFromCamera(views[viewIndex], parts[0].mesh));
-    const camera = exactCamera(views[viewIndex], parts[0].mesh, rig.depthRange(position));
+    const view = typeof which === "number" ? views[which] : which;
+    const position = new Vector3().setFromMatrixPosition(worldFromCamera(view, parts[0].mesh));
+    const camera = exactCamera(view, parts[0].mesh, rig.depthRange(position));
     const renderer = this.#stage.rendererOf(mode);
     await renderer.load?.();
     const target = new WebGLRenderTarget(width, height, { colorSpace: NoColorSpace, minFilter: NearestFilter, magFilter: NearestFilter });

@@ -15,7 +15,7 @@ from exporters.gltf import extension
 from exporters.gltf.document import Document
 from exporters.gltf.invalid import invalid
 from exporters.gltf.limits import check_size
-from exporters.gltf.png import decode_png, png_size
+from exporters.gltf.png import decode_pngs, png_size
 
 _FLOAT = (5126,)
 _INDEX = (5121, 5123, 5125)
@@ -124,7 +124,7 @@ def _page_pngs(document: Document, primitive: dict[str, Any]) -> list[bytes]:
 
 
 def _page(document: Document, primitive: dict[str, Any], pngs: list[bytes]) -> Page:
-    features0, features1, color = (decode_png(png, "page's texture") for png in pngs)
+    features0, features1, color = decode_pngs(pngs, "page's texture")
     features_u8 = np.concatenate([features0, features1], -1)
     if not np.array_equal(color[..., 3] > 0, is_opaque(features_u8)):
         raise invalid("page's textures", "must agree on where holes are", "a fallback with other holes")

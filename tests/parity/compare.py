@@ -15,6 +15,11 @@ from core.camera import Camera
 from core.render.reference import visibility
 from core.render.visibility import Visibility, subpixel_camera
 
+# What two renderers of a scene must reach. Rounding to 8 bits alone gives 59 to 60 dB. OpenGL snaps vertices to
+# 1/256 px and computes in float32, so a few samples on edges fall on the other side.
+INTERIOR_DB = 50.0
+FLIPPED_SHARE = 0.005
+
 COVERAGE_STEP = 1 / 4  # one sub-pixel
 SMALLEST_ERROR = 1e-12  # 120 dB: stands for "equal"
 VISIBLE = 3 / 255  # more than rounding to 8 bits and float32 arithmetic explain

@@ -11,14 +11,10 @@ from core.camera import Camera
 from core.render.reference import render_deferred, render_forward
 from exporters.glsl import Dialect
 from exporters.gltf import write_glb
-from tests.parity.compare import Comparison, compare, pixels_with_edges
+from tests.parity.compare import FLIPPED_SHARE, INTERIOR_DB, Comparison, compare, pixels_with_edges
 from tests.parity.gl_renderer import GlRenderer, Mode
 from tests.scenes import look_at_camera, random_network, random_scene
 
-# Rounding to 8 bits alone gives 59 dB; a wrong direction, a wrong texel row or half-precision arithmetic less than 45.
-INTERIOR_DB = 50.0
-# OpenGL snaps vertices to 1/256 px and computes in float32, so a few samples on edges fall on the other side.
-FLIPPED_SHARE = 0.005
 REFERENCES = {"deferred": render_deferred, "forward": render_forward}
 MODES: tuple[Mode, ...] = ("deferred", "forward")
 DIALECTS: tuple[Dialect, ...] = ("glsl330", "essl300")

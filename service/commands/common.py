@@ -1,6 +1,7 @@
 """Arguments that several commands share."""
 
 import argparse
+import logging
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,8 +47,16 @@ def add_service(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--database-url", default="", help="of the job engine; default: an SQLite file in the data folder"
     )
+    parser.add_argument("--keep-days", type=float, help="delete ended jobs after so many days; default: never")
+    parser.add_argument("--log-level", choices=["debug", "info", "warning", "error"], default="info")
+
+
+def start_log(arguments: argparse.Namespace, who: str) -> None:
+    """Sends the log of this process to stderr."""
+    form = f"%(asctime)s {who} %(levelname)s %(message)s"
+    logging.basicConfig(level=arguments.log_level.upper(), format=form)
 
 
 def settings_of(arguments: argparse.Namespace, worker_id: str = "") -> ServiceSettings:
-    settings = ServiceSettings(data=arguments.data, database_url=arguments.database_url)
+    settings = ServiceSettings(data=arguments.data, database_url=arguments.database_url, keep_days=arguments.keep_days)
     return replace(settings, worker_id=worker_id) if worker_id else settings

@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
         archive = _packed(arguments.capture or _sample(Path(scratch) / "sample"), Path(scratch) / "capture.zip")
         with _service(arguments.data or Path(scratch) / "data") as client:
             job = _post(client, archive, arguments)
-            print(f"job      {client.base_url}jobs/{job['id']}", flush=True)
+            print(f"job      {client.base_url}/jobs/{job['id']}", flush=True)
             _follow(client, job["id"])
             _download(client, job["id"], arguments.out)
     print(Report.from_bytes((arguments.out / "report.json").read_bytes()).as_table())
@@ -75,6 +75,7 @@ def _service(data: Path) -> Iterator[httpx.Client]:
     """A client of a service that lives as long as the context."""
     port = _free_port()
     command = [sys.executable, "-m", "service.cli", "serve", "--port", str(port), "--data", str(data)]
+    command += ["--log-level", "warning"]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     try:
         with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60.0) as client:

@@ -1,11 +1,10 @@
 """`polyfield serve`: the API, the pages and one worker."""
 
 import argparse
-import logging
 import os
 import sys
 
-from service.commands.common import add_service, settings_of
+from service.commands.common import add_service, settings_of, start_log
 from service.supervisor import Supervisor
 
 # Open event streams never end by themselves.
@@ -18,7 +17,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--port", type=int, default=8000)
     add_service(parser)
     parser.add_argument("--no-worker", action="store_true", help="workers are started elsewhere")
-    parser.add_argument("--keep-days", type=float, help="delete ended jobs after so many days; default: never")
     parser.set_defaults(run=run)
 
 
@@ -28,7 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     from service.app import create_app
     from service.database import prepare
 
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s server %(levelname)s %(message)s")
+    start_log(arguments, "server")
     settings = settings_of(arguments)
     prepare(settings)
     supervisor = None if arguments.no_worker else Supervisor(_worker_command(arguments))
@@ -51,6 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _worker_command(arguments: argparse.Namespace) -> list[str]:
     command = [sys.executable, "-m", "service.cli", "worker", "--data", str(arguments.data)]
+    command += ["--log-level", arguments.log_level]
     command += ["--database-url", arguments.database_url] if arguments.database_url else []
     command += ["--keep-days", str(arguments.keep_days)] if arguments.keep_days is not None else []
     return [*command, "--parent", str(os.getpid())]

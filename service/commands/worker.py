@@ -1,11 +1,9 @@
 """`polyfield worker`: runs the jobs of a service."""
 
 import argparse
-import logging
 import signal
-from dataclasses import replace
 
-from service.commands.common import add_service, settings_of
+from service.commands.common import add_service, settings_of, start_log
 from service.parent import end_with_parent
 
 
@@ -13,7 +11,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser = subparsers.add_parser("worker", help="run jobs; `serve` starts one by itself")
     add_service(parser)
     parser.add_argument("--id", default="", help="name among the workers; default: the host's name and -0")
-    parser.add_argument("--keep-days", type=float, help="delete ended jobs after so many days; default: never")
     parser.add_argument("--parent", type=int, default=0, help=argparse.SUPPRESS)
     parser.set_defaults(run=run)
 
@@ -21,8 +18,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def run(arguments: argparse.Namespace) -> int:
     if arguments.parent:
         end_with_parent(arguments.parent, signal.SIGTERM)
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s worker %(levelname)s %(message)s")
+    start_log(arguments, "worker")
     from service.worker import run_worker
 
-    run_worker(replace(settings_of(arguments, arguments.id), keep_days=arguments.keep_days))
+    run_worker(settings_of(arguments, arguments.id))
     return 0

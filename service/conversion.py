@@ -1,7 +1,6 @@
 """The whole path: photos -> capture -> scene -> scene.glb, read again and measured."""
 
 import shutil
-import time
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -24,6 +23,7 @@ from service.stages import EXPORT, MEASURE, READ, TRAIN, Stages
 
 SCENE, PREVIEW, REPORT = "scene.glb", "preview.png", "report.json"
 NO_HELD_OUT = "No view is held out, so the quality was not measured."
+RESUMED = "Training was interrupted and went on from its checkpoint."
 BEST_PSNR = 100.0  # what an infinite one is reported as: JSON has no infinity
 
 
@@ -60,7 +60,6 @@ def convert(
         InputError: the capture or an option cannot be used.
         TrainingFailed
     """
-    started = time.perf_counter()
     stages = Stages(progress)
     settings = settings_for(preset, **(overrides or {}))
     device = resolve_device(device)
@@ -80,7 +79,7 @@ def convert(
     report = Report(
         psnr=_figure(evaluation, "psnr"),
         ssim=_figure(evaluation, "ssim"),
-        seconds=stages.seconds | {"total": time.perf_counter() - started},
+        seconds=stages.seconds | {"total": sum(stages.seconds.values())},
         bytes=sizes,
         quads=scene.quad_count,
         triangles=scene.triangle_count,
@@ -88,7 +87,7 @@ def convert(
         settings=asdict(settings) | {"seed": seed, **photos},
         device=device,
         views={"train": len(capture.train), "test": len(capture.test)},
-        notes=capture.notes + (() if capture.test else (NO_HELD_OUT,)),
+        notes=capture.notes + (() if capture.test else (NO_HELD_OUT,)) + ((RESUMED,) if trained.resumed else ()),
     )
     _write(out_dir, {REPORT: report.as_bytes()})
     if checkpoint_dir:

@@ -27,7 +27,7 @@ class Report:
 
     Attributes:
         psnr, ssim: on the held-out views; dB, and [-1, 1].
-        seconds: stage to wall clock seconds; `total` is of everything.
+        seconds: stage to wall clock seconds, of an interrupted run too; `total` is their sum.
         bytes: artefact to its size.
         quads, triangles, pages: of the scene.
         settings: the preset with its overrides, seed and sizes: all that is needed to do it again.

@@ -21,6 +21,18 @@ COMPRESS_TYPE = zlib.Z_RLE
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _HEADER = struct.Struct(">8sI4sIIBBBBB")
 _RGBA = 6  # PNG colour type
+# Pillow reports a broken PNG in any of these ways.
+_DECODING_ERRORS = (
+    Image.DecompressionBombError,
+    EOFError,
+    IndexError,
+    KeyError,
+    OSError,
+    SyntaxError,
+    ValueError,
+    struct.error,
+    zlib.error,
+)
 
 
 def encode_pngs(images: Sequence[np.ndarray]) -> list[bytes]:
@@ -68,13 +80,14 @@ def decode_png(data: bytes, subject: str) -> np.ndarray:
     Raises:
         AssetInvalid
     """
-    size = png_size(data, subject)
+    height, width = png_size(data, subject)
     try:
         with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
+            if image.size != (width, height):  # a second header
+                raise ValueError("it states two sizes")
             pixels = np.array(image)
-    # Pillow reports a broken PNG in any of these ways.
-    except (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, IndexError, KeyError) as error:
+    except _DECODING_ERRORS as error:
         raise invalid(subject, "must be an intact PNG image", f"one that does not decode ({error})") from error
-    if pixels.shape != (*size, 4) or pixels.dtype != np.uint8:
+    if pixels.shape != (height, width, 4) or pixels.dtype != np.uint8:
         raise invalid(subject, "must be 8-bit RGBA", f"an image of shape {pixels.shape}")
     return pixels

@@ -1,8 +1,10 @@
 """Khronos' glTF validator finds no error and no warning."""
 
 import json
+import os
 import shutil
 import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,9 +22,9 @@ NODE_MODULES = Path(__file__).parents[2] / "viewer_static" / "node_modules"
 
 def validated(glb: bytes, folder: Path) -> dict[str, Any]:
     """The validator's report on a file."""
-    node = shutil.which("node")
-    assert node, "Node is missing: run `make setup`"
-    assert (NODE_MODULES / "gltf-validator").is_dir(), "gltf-validator is missing: run `make setup`"
+    node = shutil.which("node", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
+    assert node, "Node is missing, both on the PATH and beside Python"
+    assert (NODE_MODULES / "gltf-validator").is_dir(), "gltf-validator is missing: run `npm ci` in viewer_static"
     path = folder / "scene.glb"
     path.write_bytes(glb)
     run = subprocess.run([node, SCRIPT, NODE_MODULES, path], capture_output=True, text=True, timeout=60, check=True)

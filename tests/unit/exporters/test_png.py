@@ -11,6 +11,14 @@ from PIL import Image
 from core.errors import AssetInvalid
 from exporters.gltf.png import decode_png, encode_png, encode_pngs
 
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
+
+
+def header_chunk(width: int, height: int) -> bytes:
+    """IHDR of an 8-bit RGBA image."""
+    chunk = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0)
+    return struct.pack(">I", 13) + chunk + struct.pack(">I", zlib.crc32(chunk))
+
 
 def test_every_byte_survives_whatever_alpha_says(rng: np.random.Generator) -> None:
     image = rng.integers(0, 256, (31, 57, 4), dtype=np.uint8)
@@ -30,11 +38,18 @@ def test_png_carries_no_colour_profile_or_gamma() -> None:
 
 
 def test_huge_image_is_refused_from_its_header() -> None:
-    header = struct.pack(">IIBBBBB", 20_000, 20_000, 8, 6, 0, 0, 0)
-    chunk = b"IHDR" + header
-    png = b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + chunk + struct.pack(">I", zlib.crc32(chunk))
     with pytest.raises(AssetInvalid, match="20000 x 20000"):
-        decode_png(png, "image")
+        decode_png(SIGNATURE + header_chunk(20_000, 20_000), "image")
+
+
+@pytest.mark.filterwarnings("ignore::PIL.Image.DecompressionBombWarning")  # Pillow's own, at the smaller size
+@pytest.mark.parametrize("side", [10_000, 60_000])
+def test_huge_image_behind_a_small_header_is_refused(side: int) -> None:
+    png = encode_png(np.zeros((4, 4, 4), np.uint8))
+    first = SIGNATURE + header_chunk(4, 4)
+    assert png.startswith(first)
+    with pytest.raises(AssetInvalid, match="intact"):
+        decode_png(first + header_chunk(side, side) + png[len(first) :], "image")
 
 
 @pytest.mark.parametrize("mode", ["L", "RGB", "P", "I;16"])

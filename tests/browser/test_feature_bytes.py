@@ -3,11 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from core.baked import BakedScene
 from tests.browser.conftest import open_scene
 from tests.browser.site import Site
+from tests.browser.viewer import ViewerPage
 
 
 def test_every_byte_survives_the_browsers_decoder(page: Page, site: Site, scene: BakedScene) -> None:
@@ -18,6 +19,17 @@ def test_every_byte_survives_the_browsers_decoder(page: Page, site: Site, scene:
     for index, content in enumerate((written, *others)):
         np.testing.assert_array_equal(viewer.feature_texture(index, 0), content.features_u8[..., :4])
         np.testing.assert_array_equal(viewer.feature_texture(index, 1), content.features_u8[..., 4:])
+
+
+def test_browser_that_alters_bytes_is_told_apart(page: Page, site: Site, scene: BakedScene) -> None:
+    # A browser that ignores the options premultiplies.
+    page.add_init_script("const make = createImageBitmap; window.createImageBitmap = (image) => make(image)")
+    open_scene(page, site, scene)
+    expect(page.locator("#note")).to_contain_text("alters the asset's data")
+
+
+def test_browser_that_keeps_bytes_gets_no_note(viewer: ViewerPage) -> None:
+    expect(viewer.page.locator("#note")).to_be_hidden()
 
 
 def _all_alphas(size: tuple[int, int]) -> np.ndarray:

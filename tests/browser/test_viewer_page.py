@@ -1,5 +1,6 @@
 """The viewer's page as a person meets it."""
 
+import base64
 import io
 import json
 import struct
@@ -135,11 +136,9 @@ def test_panel_leaves_a_phone_room_for_the_picture(viewer: ViewerPage) -> None:
 
 def _canvas(page: Page) -> np.ndarray:
     """[h, w, 4] uint8: what the canvas shows now, straight alpha."""
-    script = "() => { polyfield.stage.drawNow(); return document.getElementById('canvas').toDataURL().split(',')[1]; }"
-    png = page.evaluate(
-        f"fetch('data:application/octet-stream;base64,' + ({script})()).then(r => r.bytes()).then(b => [...b])"
-    )
-    return np.asarray(Image.open(io.BytesIO(bytes(png))).convert("RGBA"))
+    page.evaluate("polyfield.stage.drawNow(); window.picture = document.getElementById('canvas').toDataURL()")
+    png = base64.b64decode(page.evaluate("picture").split(",")[1])
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGBA"))
 
 
 def _without_extension(glb: bytes) -> bytes:

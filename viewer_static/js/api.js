@@ -36,6 +36,7 @@ export async function listJobs() {
   return (await request(jobsUrl)).jobs;
 }
 
+export const getJob = (id) => request(jobUrl(id));
 export const cancelJob = (id) => request(`${jobUrl(id)}/cancel`, { method: "POST" });
 export const deleteJob = (id) => request(jobUrl(id), { method: "DELETE" });
 

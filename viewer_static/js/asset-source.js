@@ -1,16 +1,17 @@
 // Where the .glb comes from: a job of this service, any address, or a file of the person's own.
 
-import { artifactUrl, Problem } from "./api.js";
+import { artifactUrl, getJob, Problem } from "./api.js";
+import { nameOfJob } from "./job-name.js";
 
 const GLB_MAGIC = 0x46546c67; // "glTF", little-endian
 
 /** @typedef {{name: string, read: (onProgress: (share: number) => void) => Promise<ArrayBuffer>, url: string}} Source */
 
-/** The source that the page's address names (`?job=ID` or `?src=URL`), or null. @returns {Source | null} */
-export function sourceOfAddress(search = location.search) {
+/** The source that the page's address names (`?job=ID` or `?src=URL`), or null. @returns {Promise<Source | null>} */
+export async function sourceOfAddress(search = location.search) {
   const parameters = new URLSearchParams(search);
   const job = parameters.get("job");
-  if (job) return sourceOfUrl(artifactUrl(job, "scene.glb"), `Asset ${job.slice(0, 8)}`);
+  if (job) return sourceOfUrl(artifactUrl(job, "scene.glb"), await getJob(job).then(nameOfJob, () => job));
   const src = parameters.get("src");
   return src ? sourceOfUrl(new URL(src, document.baseURI).href) : null;
 }

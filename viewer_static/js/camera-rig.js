@@ -6,6 +6,7 @@ import { verticalFov, worldFromCamera } from "./capture-view.js";
 
 const DEFAULT_FOV = 40; // degrees
 const MARGIN = 1.02; // of the bounding sphere, so that nothing is clipped by rounding
+const TIGHTER = 0.85; // the sphere about the bounding box is wider than what is in it
 const NEAREST = 1e-3; // of the sphere's radius
 
 export class CameraRig {
@@ -54,7 +55,7 @@ export class CameraRig {
   frameScene() {
     const { center, radius } = this.#bounds;
     this.#frame = { fov: DEFAULT_FOV, aspect: 1 };
-    const distance = radius / Math.sin(MathUtils.degToRad(DEFAULT_FOV / 2));
+    const distance = (TIGHTER * radius) / Math.sin(MathUtils.degToRad(DEFAULT_FOV / 2));
     this.#camera.position.copy(center).addScaledVector(new Vector3(0.35, 0.4, 0.85).normalize(), distance);
     this.#controls.target.copy(center);
     this.#settle();

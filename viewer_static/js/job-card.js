@@ -2,6 +2,7 @@
 
 import { artifactUrl, viewerUrl } from "./api.js";
 import { formatAgo, formatBytes, formatPsnr } from "./format.js";
+import { nameOfJob } from "./job-name.js";
 import { showProblem } from "./notice.js";
 
 const STATE_NAMES = {
@@ -49,7 +50,7 @@ export class JobCard {
     this.#job = job;
     this.element.dataset.state = job.state;
     this.element.dataset.id = job.id;
-    this.#find("h3").textContent = nameOf(job);
+    this.#find("h3").textContent = nameOfJob(job);
     this.#find(".state").textContent = STATE_NAMES[job.state] ?? job.state;
     this.#find(".job-facts").textContent = factsOf(job);
     showProblem(this.#find(".job-problem"), job.state === "failed" ? (job.problem ?? {}) : null);
@@ -63,7 +64,7 @@ export class JobCard {
     this.#find(".job-progress").hidden = state !== "running";
     const bar = this.#find("progress");
     bar.value = fraction ?? 0;
-    bar.setAttribute("aria-label", `Progress of ${nameOf(this.#job)}`);
+    bar.setAttribute("aria-label", `Progress of ${nameOfJob(this.#job)}`);
     const parts = [STAGE_NAMES[stage] ?? stage ?? "Starting", `${Math.round(100 * (fraction ?? 0))} %`];
     if (typeof psnr === "number") parts.push(formatPsnr(psnr));
     this.#find(".job-stage").textContent = parts.join(" · ");
@@ -77,7 +78,7 @@ export class JobCard {
     if (url === this.#shownPreview) return;
     this.#shownPreview = url;
     const image = this.#find(".job-picture img");
-    image.alt = `Preview of ${nameOf(job)}`;
+    image.alt = `Preview of ${nameOfJob(job)}`;
     image.src = url;
   }
 
@@ -86,7 +87,7 @@ export class JobCard {
     const ended = ["succeeded", "failed", "cancelled"].includes(state);
     this.#show("view", state === "succeeded", viewerUrl(id));
     this.#show("download", state === "succeeded", artifactUrl(id, "scene.glb"));
-    this.#find("[data-action=download]").setAttribute("download", `${nameOf(this.#job)}.glb`);
+    this.#find("[data-action=download]").setAttribute("download", `${nameOfJob(this.#job)}.glb`);
     this.#show("cancel", !ended);
     this.#show("delete", ended);
   }
@@ -118,17 +119,10 @@ export class JobCard {
   }
 }
 
-const nameOf = (job) => job.name || job.options?.name || `Asset ${job.id.slice(0, 8)}`;
-
 function factsOf(job) {
-  const glb = artifactNamed(job, "scene.glb");
+  const glb = job.artifacts.find(({ name }) => name === "scene.glb");
   const parts = [job.options?.preset, formatAgo(job.created)];
   if (job.state === "succeeded" && typeof job.psnr === "number") parts.push(formatPsnr(job.psnr));
   if (glb?.bytes) parts.push(formatBytes(glb.bytes));
   return parts.filter(Boolean).join(" · ");
-}
-
-// Artefacts come as names or as objects with a name.
-function artifactNamed(job, name) {
-  return (job.artifacts ?? []).find((artifact) => (artifact.name ?? artifact) === name);
 }

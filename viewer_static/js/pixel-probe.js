@@ -2,6 +2,7 @@
 
 import { NearestFilter, NoColorSpace, Vector3, WebGLRenderTarget } from "three";
 import { exactCamera, worldFromCamera } from "./capture-view.js";
+import { readTextureBytes } from "./texture-bytes.js";
 
 export class PixelProbe {
   #stage;
@@ -49,19 +50,7 @@ export class PixelProbe {
    */
   readFeatureTexture(page, half) {
     const { webgl, gltf } = this.#stage;
-    const texture = gltf.neural.parts[page].material.textures[half];
-    const { width, height } = texture.userData.size;
-    webgl.initTexture(texture);
-    const gl = webgl.getContext();
-    const framebuffer = gl.createFramebuffer();
-    const bytes = new Uint8Array(4 * width * height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
-    const handle = webgl.properties.get(texture).__webglTexture;
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, handle, 0);
-    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
-    gl.deleteFramebuffer(framebuffer);
-    webgl.resetState();
-    return { width, height, bytes }; // uploaded without a flip: texture row 0 is the image's top
+    return readTextureBytes(webgl, gltf.neural.parts[page].material.textures[half]);
   }
 }
 

@@ -1,7 +1,7 @@
 // The viewer: one asset on a stage, with its controls.
 
 import { sourceOfAddress, sourceOfFile } from "./asset-source.js";
-import { hideMessage, showLoading, showMessage } from "./message.js";
+import { hideMessage, showLoading, showMessage, showNote } from "./message.js";
 import { hasWebGL2 } from "./webgl2.js";
 
 const byId = (id) => document.getElementById(id);
@@ -23,18 +23,23 @@ async function start() {
   }
   viewer = makeViewer();
   listenForFiles();
-  const source = sourceOfAddress();
+  const source = await sourceOfAddress();
   if (source) await show(source);
-  else showMessage({ title: "Open an asset", text: "Choose a .glb file, or drop one on this page." });
+  else await viewer.then(invite, (error) => showMessage({ title: "The viewer cannot start", text: error.message }));
+}
+
+function invite() {
+  showMessage({ title: "Open an asset", text: "Choose a .glb file, or drop one on this page." });
 }
 
 // three.js is fetched only where it can run.
 async function makeViewer() {
-  const [{ Stage }, { Hud }, { PixelProbe }, { loadGlb }] = await Promise.all([
+  const [{ Stage }, { Hud }, { PixelProbe }, { loadGlb }, { decodesExactly }] = await Promise.all([
     import("./stage.js"),
     import("./hud.js"),
     import("./pixel-probe.js"),
     import("./neural-loader.js"),
+    import("./decoder-check.js"),
   ]);
   const stage = new Stage(byId("canvas"));
   const probe = new PixelProbe(stage);
@@ -42,18 +47,19 @@ async function makeViewer() {
   window.polyfield.readFeatureTexture = (...args) => probe.readFeatureTexture(...args);
   window.polyfield.stage = stage;
   byId("canvas").addEventListener("webglcontextlost", onContextLost);
-  return { stage, hud: new Hud(stage), loadGlb };
+  return { stage, hud: new Hud(stage), loadGlb, exact: await decodesExactly(stage.webgl) };
 }
 
 async function show(source) {
   showLoading(NaN);
   try {
-    const [{ stage, hud, loadGlb }, bytes] = await Promise.all([viewer, source.read(showLoading)]);
+    const [{ stage, hud, loadGlb, exact }, bytes] = await Promise.all([viewer, source.read(showLoading)]);
     showLoading(NaN);
     const gltf = await loadGlb(bytes);
     hideMessage();
     stage.setAsset(gltf);
     hud.setAsset(source, bytes.byteLength);
+    if (gltf.neural && !exact) showNote("This browser alters the asset's data: colours may be wrong. Try another one.");
   } catch (error) {
     showMessage({ title: "This asset cannot be shown", text: [error.message, error.remedy].filter(Boolean).join("\n") });
   } finally {

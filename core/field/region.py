@@ -17,6 +17,9 @@ from core.errors import CaptureEmpty
 from core.field.frame import Frame
 
 HULL_CELLS = 64
+# The box around the object is found from coarse to fine: each look's cells are a part of the box before.
+SEARCH_CELLS = (32, 64, 96)
+SEARCH_VIEWS = 32  # for the box; the hull itself is carved by all photos
 # Of the distance from the looked-at point to the nearest camera: how far the first search reaches.
 SEARCH_REACH = 0.95
 # What fewer photos than this share see cannot be reconstructed.
@@ -49,8 +52,9 @@ def find_region(capture: Capture) -> Region:
     if not capture.has_alpha:
         return Region(Frame(centre, REACH_WITHOUT_ALPHA * float(np.median(distances))), everything)
     frame = Frame(centre, SEARCH_REACH * float(distances.min()))
-    for _ in range(2):  # the second look refines the box that the first one finds
-        frame = _enclosing(frame, visual_hull(capture.train, frame))
+    some = capture.train[:: max(1, len(capture.train) // SEARCH_VIEWS)]
+    for cells in SEARCH_CELLS:
+        frame = _enclosing(frame, visual_hull(some, frame, cells))
     return Region(frame, visual_hull(capture.train, frame))
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import warp as wp
 
-from core.kernels.types import FAR, cube_span, safe_inverse, vec8
+from core.kernels.types import FAR, PARALLEL, cube_span, vec8
 
 OPTIONS = {"enable_backward": False, "fast_math": True}
 wp.set_module_options(OPTIONS)
@@ -28,11 +28,12 @@ class QuadMesh:
     """A quad's corners stand in the order 00, 01, 10, 11 of its (a, b) coordinates; its diagonal runs from 00 to 11."""
 
     cells: int  # P, per axis
-    cell_slot: wp.array(dtype=wp.int32)  # [P^3] -> slot, or -1
+    cell_slot: wp.array(dtype=wp.int32)  # [P^3] -> slot, or -(cells to the nearest cell that has one)
     slot_start: wp.array(dtype=wp.int32)  # [slots + 1] into slot_quads
     slot_quads: wp.array(dtype=wp.int32)
     quads: wp.array(dtype=wp.vec4i)  # [Q] -> vertices
     vertices: wp.array(dtype=wp.vec3)
+    balls: wp.array(dtype=wp.vec4)  # [Q], centre and squared radius of a ball around each quad
 
 
 @wp.struct
@@ -91,6 +92,30 @@ def hit_quad(mesh: QuadMesh, quad: int, o: wp.vec3, e1: wp.vec3, e2: wp.vec3, d:
 
 
 @wp.func
+def meets_ball(ball: wp.vec4, o: wp.vec3, d: wp.vec3):
+    """Whether the line of a ray meets a ball: most quads near a ray are ruled out by this alone."""
+    c = wp.vec3(ball[0], ball[1], ball[2]) - o
+    along = wp.dot(c, d)
+    across = c - along * d
+    return wp.dot(across, across) <= ball[3]
+
+
+@wp.kernel
+def bound_quads(first: int, mesh: QuadMesh):
+    """Puts a ball around each quad; to be run whenever vertices have moved."""
+    q = first + wp.tid()
+    corner = mesh.quads[q]
+    centre = 0.25 * (
+        mesh.vertices[corner[0]] + mesh.vertices[corner[1]] + mesh.vertices[corner[2]] + mesh.vertices[corner[3]]
+    )
+    reach = float(0.0)
+    for i in range(4):
+        reach = wp.max(reach, wp.length_sq(mesh.vertices[corner[i]] - centre))
+    # float32 resolves a ray's distance from the ball to about 1e-6 of the cube
+    mesh.balls[q] = wp.vec4(centre[0], centre[1], centre[2], reach * 1.001 + 1.0e-10)
+
+
+@wp.func
 def insert_hit(hits: Hits, r: int, lowest: int, n: int, quad: int, hit: wp.vec3):
     """Puts a hit among the hits lowest..n-1 of ray r, sorted by distance."""
     m = int(n)
@@ -102,6 +127,59 @@ def insert_hit(hits: Hits, r: int, lowest: int, n: int, quad: int, hit: wp.vec3)
     hits.t[r, m] = hit[0]
     hits.quad[r, m] = quad
     hits.ab[r, m] = wp.vec2(hit[1], hit[2])
+
+
+@wp.func
+def cell_at(p: wp.vec3, P: int):
+    s = float(P) * 0.5
+    return wp.vec3i(
+        wp.clamp(int((p[0] + 1.0) * s), 0, P - 1),
+        wp.clamp(int((p[1] + 1.0) * s), 0, P - 1),
+        wp.clamp(int((p[2] + 1.0) * s), 0, P - 1),
+    )
+
+
+@wp.func
+def axis_inverse(d: float):
+    """1 / d; huge where a ray runs parallel to the planes of an axis."""
+    return wp.where(wp.abs(d) < PARALLEL, FAR, 1.0 / d)
+
+
+@wp.func
+def exit_distance(o: float, inverse: float, cell: int, reach: int, size: float):
+    """Where a ray passes the far side, along one axis, of the block of cells less than `reach` from a cell."""
+    side = wp.where(inverse > 0.0, cell + reach, cell - reach + 1)
+    return wp.where(inverse == FAR, FAR, (float(side) * size - 1.0 - o) * inverse)
+
+
+@wp.func
+def block_exit(o: wp.vec3, inverse: wp.vec3, cell: wp.vec3i, reach: int, size: float):
+    return wp.vec3(
+        exit_distance(o[0], inverse[0], cell[0], reach, size),
+        exit_distance(o[1], inverse[1], cell[1], reach, size),
+        exit_distance(o[2], inverse[2], cell[2], reach, size),
+    )
+
+
+@wp.func
+def next_along(p: float, inverse: float, cell: int, reach: int, crossed: bool, half_cells: float):
+    """The next cell along one axis: just outside of the block where the ray crossed its side, else within it."""
+    outside = wp.where(inverse > 0.0, cell + reach, cell - reach)
+    inside = wp.clamp(int((p + 1.0) * half_cells), cell - reach + 1, cell + reach - 1)
+    return wp.where(crossed, outside, inside)
+
+
+@wp.func
+def next_cell(p: wp.vec3, inverse: wp.vec3, cell: wp.vec3i, reach: int, leave: wp.vec3, half_cells: float):
+    """The cell behind the block of cells around `cell` that the ray leaves at p; P or -1 outside of the grid."""
+    crosses_x = leave[0] <= leave[1] and leave[0] <= leave[2]
+    crosses_y = not crosses_x and leave[1] <= leave[2]
+    crosses_z = not crosses_x and not crosses_y
+    return wp.vec3i(
+        next_along(p[0], inverse[0], cell[0], reach, crosses_x, half_cells),
+        next_along(p[1], inverse[1], cell[1], reach, crosses_y, half_cells),
+        next_along(p[2], inverse[2], cell[2], reach, crosses_z, half_cells),
+    )
 
 
 @wp.func
@@ -136,40 +214,32 @@ def trace_kernel(alpha_of: Callable[..., float], surface_type: Any) -> wp.Kernel
         d = directions[r]
         capacity = hits.t.shape[1]
         P = mesh.cells
-        size = 2.0 / float(P)
         t, stop = cube_span(o, d, 0.99999)
         e1 = perpendicular(d)
         e2 = wp.cross(d, e1)
-        cell = wp.vec3i()
-        side = wp.vec3i()
-        leave = wp.vec3()
-        pace = wp.vec3()
-        for axis in range(3):
-            inverse = safe_inverse(d[axis])
-            side[axis] = wp.where(d[axis] > 0.0, 1, -1)
-            cell[axis] = wp.clamp(int((o[axis] + d[axis] * t + 1.0) / size), 0, P - 1)
-            pace[axis] = size * wp.abs(inverse)
-            leave[axis] = FAR
-            if wp.abs(inverse) < FAR:
-                boundary = float(cell[axis] + (side[axis] + 1) / 2) * size - 1.0
-                leave[axis] = (boundary - o[axis]) * inverse
+        inverse = wp.vec3(axis_inverse(d[0]), axis_inverse(d[1]), axis_inverse(d[2]))
+        size = 2.0 / float(P)
+        half_cells = 0.5 * float(P)
+        cell = cell_at(o + t * d, P)
         T = float(1.0)
         opaque = int(0)
         n = int(0)
-        alive = int(1)
-        if t >= stop:
-            alive = 0
-        while alive == 1:
-            t_leave = wp.min(leave)
+        alive = t < stop
+        while alive:
             slot = mesh.cell_slot[(cell[0] * P + cell[1]) * P + cell[2]]
+            # An empty cell tells how far around it all others are empty too: leave that block in one go.
+            reach = wp.max(-slot, 1)
+            leave = block_exit(o, inverse, cell, reach, size)
+            t_leave = wp.min(leave)
             if slot >= 0:
                 lowest = n
                 for k in range(mesh.slot_start[slot], mesh.slot_start[slot + 1]):
                     quad = mesh.slot_quads[k]
-                    hit = hit_quad(mesh, quad, o, e1, e2, d)
-                    if hit[0] > 0.0 and hit[0] >= t and hit[0] < t_leave and n < capacity:
-                        insert_hit(hits, r, lowest, n, quad, hit)
-                        n += 1
+                    if meets_ball(mesh.balls[quad], o, d):
+                        hit = hit_quad(mesh, quad, o, e1, e2, d)
+                        if hit[0] > 0.0 and hit[0] >= t and hit[0] < t_leave and n < capacity:
+                            insert_hit(hits, r, lowest, n, quad, hit)
+                            n += 1
                 m = int(lowest)
                 while m < n:
                     alpha = alpha_of(surface, hits.quad[r, m], hits.ab[r, m], o + hits.t[r, m] * d)
@@ -181,20 +251,11 @@ def trace_kernel(alpha_of: Callable[..., float], surface_type: Any) -> wp.Kernel
                     m += 1
                     if opaque >= 2 and (binary_only == 1 or T < OPAQUE):
                         n = m
-                        alive = 0
+                        alive = False
             t = t_leave
-            if t >= stop or n >= capacity:
-                alive = 0
-            if alive == 1:
-                axis = int(2)
-                if leave[0] <= leave[1] and leave[0] <= leave[2]:
-                    axis = 0
-                elif leave[1] <= leave[2]:
-                    axis = 1
-                cell[axis] = cell[axis] + side[axis]
-                leave[axis] = leave[axis] + pace[axis]
-                if cell[axis] < 0 or cell[axis] >= P:
-                    alive = 0
+            cell = next_cell(o + t * d, inverse, cell, reach, leave, half_cells)
+            outside = wp.min(cell) < 0 or wp.max(cell) >= P
+            alive = alive and t < stop and n < capacity and not outside
         hits.count[r] = n
 
     return trace

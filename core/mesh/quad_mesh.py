@@ -6,13 +6,18 @@ import numpy as np
 import torch
 import warp as wp
 from torch import Tensor
+from torch.nn import functional
 
 from core.errors import TrainingFailed
+from core.kernels.launch import launch
 from core.kernels.trace import QuadMesh as KernelMesh
+from core.kernels.trace import bound_quads
 
 # A vertex may go this far from its cell's centre, in cells: within the cell, so that rays find every hit.
 VERTEX_REACH = 0.49
 CORNERS = 4
+# Empty space is skipped in blocks of at most this many cells to each side.
+FARTHEST = 16
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ class QuadMesh:
         corner = self.quads.reshape(-1)
         order = np.argsort(corner, kind="stable")
         start = np.searchsorted(corner[order], np.arange(len(self.kept) + 1))
-        slots = np.full(self.cells**3, -1, np.int32)
+        slots = -_distance_to(self.kept, self.cells)
         slots[self.kept] = np.arange(len(self.kept))
         mesh = KernelMesh()
         mesh.cells = self.cells
@@ -58,6 +63,8 @@ class QuadMesh:
         mesh.slot_quads = wp.array((order // CORNERS).astype(np.int32), dtype=wp.int32, device=device)
         mesh.quads = wp.array(self.quads, dtype=wp.vec4i, device=device)
         mesh.vertices = wp.from_torch(self.vertices, dtype=wp.vec3)
+        mesh.balls = wp.zeros(len(self.quads), dtype=wp.vec4, device=device)
+        launch(bound_quads, len(self.quads), [mesh], device)
         return mesh
 
 
@@ -92,6 +99,17 @@ def build_mesh(solid: np.ndarray, centroid: np.ndarray, device: str) -> QuadMesh
     moved = np.clip(np.where(np.isfinite(seen), seen - centres, 0.0), -reach, reach)
     vertices = torch.from_numpy((centres + moved).astype(np.float32)).to(device)
     return replace(mesh, vertices=vertices)
+
+
+def _distance_to(kept: np.ndarray, cells: int) -> np.ndarray:
+    """[cells^3] int32: how many cells away, along the farthest axis, the nearest kept cell is; at most FARTHEST."""
+    near = torch.zeros(1, 1, cells, cells, cells)
+    near.view(-1)[torch.from_numpy(kept)] = 1.0
+    distance = torch.full((cells**3,), FARTHEST, dtype=torch.int32)
+    for steps in range(FARTHEST):
+        distance[(near.view(-1) > 0) & (distance == FARTHEST)] = steps
+        near = functional.max_pool3d(near, 3, 1, 1)
+    return distance.numpy()
 
 
 def _quads_across(solid: np.ndarray, index: np.ndarray, axis: int) -> np.ndarray:

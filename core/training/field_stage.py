@@ -131,6 +131,7 @@ class FieldStage(Stage):
         grad = as_vec3(self._vertex_grad)
         inputs = [value, grad, m1, m2, centres, reach, rate, VERTEX_PULL, bias_correction(self.done + 1)]
         launch(adam_vertices, len(self.mesh.vertices), inputs, self.device)
+        self._tracer.vertices_moved()
 
     def _kernel_gradients(self) -> VolumeGradients:
         gradients = VolumeGradients()

@@ -9,7 +9,7 @@ from torch import Tensor
 from core.field.frame import as_vec3, empty
 from core.kernels.composite import PixelSums
 from core.kernels.launch import launch
-from core.kernels.trace import Hits
+from core.kernels.trace import Hits, bound_quads
 from core.kernels.types import vec8
 from core.mesh.quad_mesh import QuadMesh
 from core.training.pixels import Batch
@@ -55,6 +55,10 @@ class Tracer:
         grads = [_kernel_sums(*grad_continuous), _kernel_sums(*grad_binary)]
         shared = [self.kernel_mesh, surface, *rays, self.subrays, self._hits, *grads]
         launch(self._backward, self.pixels, lambda part: [*shared, part, gradients], self.device, parts)
+
+    def vertices_moved(self) -> None:
+        """To be called when the mesh's vertices have changed."""
+        launch(bound_quads, self.kernel_mesh.quads.shape[0], [self.kernel_mesh], self.device)
 
     def seen_quads(self, least: float) -> Tensor:
         """Quads with a hit of the last `forward` that weighs more than `least`."""

@@ -49,11 +49,13 @@ def _arguments() -> argparse.Namespace:
 def _run(folder: JobFolder, channel: IO[str]) -> None:
     options = Options.from_json(folder.request()["options"])
     preview = folder.artifacts / "preview.png"
+    # One that goes on from a checkpoint starts behind what was last reported; the bar waits for it there.
+    reached = folder.progress().get("fraction", 0.0)
 
     def progress(report: Progress) -> None:
         if report.preview_u8 is not None:
             write_atomically(preview, png_bytes(report.preview_u8))
-        numbers = {"stage": report.stage, "fraction": report.fraction, "psnr": report.psnr}
+        numbers = {"stage": report.stage, "fraction": max(reached, report.fraction), "psnr": report.psnr}
         _send(channel, report=numbers | {"preview": preview.exists()})
 
     convert(

@@ -21,11 +21,13 @@ ENV PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
 RUN python -m venv /opt/polyfield
 ENV PATH=/opt/polyfield/bin:$PATH
 WORKDIR /app
-COPY pyproject.toml README.md constraints*.txt ./
+COPY pyproject.toml README.md constraints.txt ./
 # The packages' layer depends on these files only, so that a change of the sources rebuilds in seconds.
-RUN touch constraints.txt && mkdir -p core exporters service \
-    && pip install ${TORCH_INDEX:+--index-url "$TORCH_INDEX"} torch \
-    && pip install --constraint constraints.txt .  \
+RUN mkdir -p core exporters service \
+    && if [ -n "$TORCH_INDEX" ]; then \
+         pip install --no-deps --index-url "$TORCH_INDEX" --constraint constraints.txt torch; \
+       fi \
+    && pip install --constraint constraints.txt . \
     && pip uninstall --yes polyfield
 
 FROM python:${PYTHON}-slim

@@ -62,7 +62,7 @@ format: $(PACKAGES)  ## put the sources in form
 out/sample:
 	$(BIN)/polyfield sample $@
 
-bench: $(PACKAGES) $(if $(filter out/sample,$(CAPTURE)),out/sample)  ## convert CAPTURE with PRESET; a row of benchmarks/results
+bench: $(PACKAGES) $(if $(filter out/sample,$(CAPTURE)),out/sample)  ## measure a conversion of CAPTURE with PRESET
 	$(BIN)/python -m benchmarks.convert $(CAPTURE) --preset $(PRESET) $(BENCH_ARGS)
 
 clean:  ## remove what `make setup` and the tools made

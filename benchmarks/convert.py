@@ -2,9 +2,9 @@
 
     python -m benchmarks.convert CAPTURE [--preset draft] [--set NAME=VALUE ...] [--goal-psnr DB] [--goal-seconds S]
 
-Quality is that of the written scene.glb, read again, on the held-out views. Adds a row to convert.json and convert.md in
-the results folder, and a picture of one held-out view beside them: photo, render, error. A row replaces the one of the
-same name and hardware. With goals, the exit status is 1 where they are missed.
+Quality is that of the written scene.glb, read again, on the held-out views. Adds a row to convert.json and convert.md
+in the results folder, and a picture of one held-out view beside them: photo, render, error. A row replaces the one of
+the same name and hardware. With goals, the exit status is 1 where they are missed.
 """
 
 import argparse

@@ -28,7 +28,10 @@ from tests.parity.compare import Comparison, compare, pixels_with_edges
 
 REFERENCES: dict[str, Renderer] = {"deferred": render_deferred, "forward": render_forward}
 DIFFERENCE_GAIN = 32  # makes one step of 8 bits visible
-UNMASKED_RENDERER = 0x9246  # of WEBGL_debug_renderer_info, which the viewer's context has on
+RENDERER_NAME = """() => {
+  const gl = polyfield.stage.webgl.getContext();
+  return gl.getParameter(gl.getExtension("WEBGL_debug_renderer_info").UNMASKED_RENDERER_WEBGL);
+}"""
 WINDOW = {"width": 400, "height": 300}  # the page's own canvas is not what is measured
 
 
@@ -77,7 +80,7 @@ def main() -> None:
     with running_site() as site, running_browser() as browser:
         site.files["/scene.glb"] = glb
         viewer = open_viewer(browser.new_page(viewport=WINDOW), f"{site.url}/viewer.html?src=/scene.glb")
-        renderer = viewer.page.evaluate(f"polyfield.stage.webgl.getContext().getParameter({UNMASKED_RENDERER})")
+        renderer = viewer.page.evaluate(RENDERER_NAME)
         rows = measure(viewer, scene, camera, arguments.out)
         altered = altered_bytes(viewer, scene)
     print(f"view {camera.name}, {camera.size_px[0]} x {camera.size_px[1]} px, {renderer}")

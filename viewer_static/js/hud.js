@@ -12,11 +12,16 @@ const byId = (id) => document.getElementById(id);
 export class Hud {
   #stage;
   #fileBytes = 0;
-  #shownAt = 0;
+  #showing = null; // the timer of the next change of figures
 
   constructor(stage) {
     this.#stage = stage;
-    stage.onFrame = () => this.#showTimes();
+    stage.onFrame = () => {
+      this.#showing ??= setTimeout(() => {
+        this.#showing = null;
+        this.#showTimes();
+      }, FIGURES_MS);
+    };
     this.#listen();
     this.#openPanel(matchMedia("(min-width: 44rem)").matches);
   }
@@ -122,15 +127,12 @@ export class Hud {
   }
 
   #showTimes() {
-    const now = performance.now();
-    if (now - this.#shownAt < FIGURES_MS) return;
-    this.#shownAt = now;
     const { frameMs, gpuMs } = this.#stage.times;
+    this.#showFacts({ frameMs, gpuMs });
     if (Number.isNaN(frameMs)) return;
     // In a short run, frames queue up before the graphics processor and seem to take less than they do.
     const shownMs = gpuMs > frameMs ? gpuMs : frameMs;
     byId("pill").textContent = `${shownMs.toFixed(1)} ms · ${Math.round(1000 / shownMs)} fps`;
-    this.#showFacts({ frameMs, gpuMs });
   }
 
   #showFacts({ frameMs, gpuMs } = this.#stage.times) {

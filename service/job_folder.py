@@ -4,7 +4,6 @@ import fcntl
 import json
 import re
 import shutil
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -78,25 +77,17 @@ class JobFolder:
         shutil.rmtree(self.path, ignore_errors=True)
 
     @contextmanager
-    def lock(self, timeout_s: float = 0.0) -> Iterator[IO[bytes]]:
+    def lock(self) -> Iterator[IO[bytes]]:
         """Holds the folder; yields the lock's file, which a child may inherit and then holds it too.
 
-        The kernel frees the lock when the last process with the file ends, however it ends. Blocks for `timeout_s`.
+        The kernel frees the lock when the last process with the file ends, however it ends.
 
         Raises:
             BlockingIOError: somebody else still holds it.
             FileNotFoundError: the job is gone.
         """
-        deadline = time.monotonic() + timeout_s
         with (self.path / "trainer.lock").open("ab") as file:
-            while True:
-                try:
-                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    break
-                except BlockingIOError:
-                    if time.monotonic() >= deadline:
-                        raise
-                    time.sleep(0.05)
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             yield file
 
 

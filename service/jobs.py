@@ -1,6 +1,7 @@
 """Jobs as the API sees them: a row of the job engine and a folder."""
 
 import asyncio
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import aclosing
 from datetime import UTC, datetime
@@ -28,6 +29,7 @@ NO_PROGRESS: dict[str, Any] = {"stage": None, "fraction": 0.0, "psnr": None, "pr
 ENDED = ("succeeded", "failed", "cancelled")
 # A worker looks once a second whether its job was cancelled; ten times that means it hangs.
 RELEASE_TIMEOUT_S = 10.0
+RELEASE_POLL_S = 0.05
 
 
 class Jobs:
@@ -77,7 +79,7 @@ class Jobs:
         """
         if (await self.get(job_id))["state"] not in ENDED:
             await self._client.cancel_workflow_async(job_id)
-            await asyncio.to_thread(_when_released, self._folder(job_id), JobFolder.drop_inputs)
+            await _when_released(self._folder(job_id), JobFolder.drop_inputs)
         return await self.get(job_id)
 
     async def delete(self, job_id: str) -> None:
@@ -89,7 +91,7 @@ class Jobs:
         """
         await self.cancel(job_id)
         # The row goes last: a worker learns from it that its job is cancelled.
-        await asyncio.to_thread(_when_released, self._folder(job_id), JobFolder.remove)
+        await _when_released(self._folder(job_id), JobFolder.remove)
         await self._client.delete_workflow_async(job_id)
 
     async def reports(self, job_id: str, after: int = 0) -> AsyncIterator[tuple[int, dict[str, Any]]]:
@@ -153,14 +155,29 @@ def _problem(row: WorkflowStatus) -> dict[str, Any] | None:
     return problem_of(JobInterrupted("job", rule, received, remedy))
 
 
-def _when_released(folder: JobFolder, act: Callable[[JobFolder], None]) -> None:
+async def _when_released(folder: JobFolder, act: Callable[[JobFolder], None]) -> None:
+    """Acts on a job's folder once its trainer is gone.
+
+    Raises:
+        JobBusy
+    """
+    deadline = time.monotonic() + RELEASE_TIMEOUT_S
+    # The waiting is done here, not in a thread: there are few of those, and all other answers need them.
+    while not await asyncio.to_thread(_acted, folder, act):
+        if time.monotonic() > deadline:
+            raise JobBusy(f"job {folder.id}", "must be let go by its worker", "", "Try again in a minute.")
+        await asyncio.sleep(RELEASE_POLL_S)
+
+
+def _acted(folder: JobFolder, act: Callable[[JobFolder], None]) -> bool:
     try:
-        with folder.lock(RELEASE_TIMEOUT_S):
+        with folder.lock():
             act(folder)
-    except FileNotFoundError:
-        pass
     except BlockingIOError:
-        raise JobBusy(f"job {folder.id}", "must be let go by its worker", "", "Try again in a minute.") from None
+        return False
+    except FileNotFoundError:
+        pass  # somebody else has removed it
+    return True
 
 
 def _unknown(job_id: str) -> JobNotFound:

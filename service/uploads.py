@@ -30,21 +30,25 @@ async def receive_job(request: Request, settings: ServiceSettings) -> JobFolder:
     """
     _refuse_announced(request, settings.limits)
     job_id = uuid.uuid4().hex
-    staging = settings.incoming / job_id
+    staging = JobFolder(settings.incoming / job_id)
+    received = staging.path / "received"
     try:
-        received = staging / "received"
-        received.mkdir(parents=True)
+        await asyncio.to_thread(received.mkdir, parents=True)
         content_type = request.headers.get("content-type", "")
         form = await receive_form(content_type, request.stream(), received, settings.limits)
         options = Options.from_text(form.words(), form.fields.get(SETTING_FIELD, ()))
-        folder = JobFolder(staging)
-        await asyncio.to_thread(_make_capture, form, received, folder, settings.limits)
-        folder.write_request(_request_of(job_id, form, options))
-        folder.artifacts.mkdir()
-        staging.rename(settings.jobs / job_id)
+        await asyncio.to_thread(_make_capture, form, received, staging, settings.limits)
+        accepted = JobFolder(settings.jobs / job_id)
+        await asyncio.to_thread(_accept, staging, _request_of(job_id, form, options), accepted)
+        return accepted
     finally:
-        shutil.rmtree(staging, ignore_errors=True)
-    return JobFolder(settings.jobs / job_id)
+        await asyncio.to_thread(staging.remove)
+
+
+def _accept(staging: JobFolder, request: dict[str, object], accepted: JobFolder) -> None:
+    staging.write_request(request)
+    staging.artifacts.mkdir()
+    staging.path.rename(accepted.path)
 
 
 def _refuse_announced(request: Request, limits: Limits) -> None:

@@ -80,15 +80,15 @@ def hit_triangle(v0: wp.vec3, vm: wp.vec3, v3: wp.vec3):
 
 @wp.func
 def hit_quad(mesh: QuadMesh, quad: int, o: wp.vec3, e1: wp.vec3, e2: wp.vec3, d: wp.vec3):
-    """(t, a, b) of the ray's hit on a quad; t < 0 where it misses."""
+    """(t, a, b) where the ray meets each of a quad's triangles; t < 0 where it misses. A folded quad is met twice."""
     q = mesh.quads[quad]
     v0 = into_frame(mesh.vertices[q[0]] - o, e1, e2, d)
     v3 = into_frame(mesh.vertices[q[3]] - o, e1, e2, d)
-    hit = hit_triangle(v0, into_frame(mesh.vertices[q[1]] - o, e1, e2, d), v3)
-    if hit[0] > 0.0:
-        return wp.vec3(hit[0], hit[2], hit[1] + hit[2])
-    hit = hit_triangle(v0, into_frame(mesh.vertices[q[2]] - o, e1, e2, d), v3)
-    return wp.vec3(hit[0], hit[1] + hit[2], hit[2])
+    first = hit_triangle(v0, into_frame(mesh.vertices[q[1]] - o, e1, e2, d), v3)
+    second = hit_triangle(v0, into_frame(mesh.vertices[q[2]] - o, e1, e2, d), v3)
+    if first[0] > 0.0 and second[1] == 0.0:  # a hit on the diagonal is one hit
+        second = wp.vec3(-1.0, 0.0, 0.0)
+    return wp.vec3(first[0], first[2], first[1] + first[2]), wp.vec3(second[0], second[1] + second[2], second[2])
 
 
 @wp.func
@@ -116,9 +116,17 @@ def bound_quads(first: int, mesh: QuadMesh):
 
 
 @wp.func
-def insert_hit(hits: Hits, r: int, lowest: int, n: int, quad: int, hit: wp.vec3):
-    """Puts a hit among the hits lowest..n-1 of ray r, sorted by distance."""
-    m = int(n)
+def insert_hit(hits: Hits, r: int, lowest: int, n: int, quad: int, hit: wp.vec3, t: float, t_leave: float):
+    """Puts a hit, if it lies within [t, t_leave), among the hits lowest..n-1 of ray r, sorted by distance.
+
+    Returns the number of hits; where there is no room for one more, the farthest goes.
+    """
+    if hit[0] <= 0.0 or hit[0] < t or hit[0] >= t_leave:
+        return n
+    m = wp.min(n, hits.t.shape[1] - 1)
+    if m < n and hits.t[r, m] <= hit[0]:
+        return n
+    count = m + 1
     while m > lowest and hits.t[r, wp.max(m - 1, 0)] > hit[0]:
         hits.t[r, m] = hits.t[r, m - 1]
         hits.quad[r, m] = hits.quad[r, m - 1]
@@ -127,6 +135,7 @@ def insert_hit(hits: Hits, r: int, lowest: int, n: int, quad: int, hit: wp.vec3)
     hits.t[r, m] = hit[0]
     hits.quad[r, m] = quad
     hits.ab[r, m] = wp.vec2(hit[1], hit[2])
+    return count
 
 
 @wp.func
@@ -236,10 +245,9 @@ def trace_kernel(alpha_of: Callable[..., float], surface_type: Any) -> wp.Kernel
                 for k in range(mesh.slot_start[slot], mesh.slot_start[slot + 1]):
                     quad = mesh.slot_quads[k]
                     if meets_ball(mesh.balls[quad], o, d):
-                        hit = hit_quad(mesh, quad, o, e1, e2, d)
-                        if hit[0] > 0.0 and hit[0] >= t and hit[0] < t_leave and n < capacity:
-                            insert_hit(hits, r, lowest, n, quad, hit)
-                            n += 1
+                        first_hit, second_hit = hit_quad(mesh, quad, o, e1, e2, d)
+                        n = insert_hit(hits, r, lowest, n, quad, first_hit, t, t_leave)
+                        n = insert_hit(hits, r, lowest, n, quad, second_hit, t, t_leave)
                 m = int(lowest)
                 while m < n:
                     alpha = alpha_of(surface, hits.quad[r, m], hits.ab[r, m], o + hits.t[r, m] * d)

@@ -1,7 +1,7 @@
 """The README's picture: a held-out photo beside the render of its .glb.
 
-    polyfield sample out/sample && polyfield convert out/sample -o out/readme
-    python scripts/readme_picture.py out/sample out/readme/scene.glb docs/images/sample.png [--view 0]
+polyfield sample out/sample && polyfield convert out/sample -o out/readme
+python scripts/readme_picture.py out/sample out/readme/scene.glb docs/images/sample.png [--view 0]
 """
 
 import argparse

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+import core.kernels  # noqa: F401  (starts Warp without its chatter)
 from core.camera import Camera
 from core.sample import kernels
 from core.sample.design import design_of

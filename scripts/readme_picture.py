@@ -1,17 +1,20 @@
-"""The README's picture: a held-out photo beside the render of its .glb.
+"""The README's picture: held-out photos of a capture above the renders of its .glb.
 
 polyfield sample out/sample && polyfield convert out/sample -o out/readme
-python scripts/readme_picture.py out/sample out/readme/scene.glb docs/images/sample.png [--view 0]
+python scripts/readme_picture.py out/sample out/readme/scene.glb docs/images/sample.png
 """
 
 import argparse
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 from core.datasets import read_capture
 from core.evaluation import comparison_picture
 from exporters.gltf import read_glb
+
+VIEWS = 4
 
 
 def main() -> None:
@@ -19,12 +22,13 @@ def main() -> None:
     parser.add_argument("capture", type=Path)
     parser.add_argument("glb", type=Path)
     parser.add_argument("picture", type=Path)
-    parser.add_argument("--view", type=int, default=0, help="number of the held-out view")
     arguments = parser.parse_args()
-    view = read_capture(arguments.capture).test[arguments.view]
-    photo_render_error = comparison_picture(read_glb(arguments.glb.read_bytes()), view)
-    width = view.camera.size_px[0]
-    Image.fromarray(photo_render_error[:, : 2 * width]).save(arguments.picture, optimize=True)
+    views = read_capture(arguments.capture).test
+    chosen = [views[i] for i in np.linspace(0, len(views), VIEWS, endpoint=False).astype(int)]
+    scene = read_glb(arguments.glb.read_bytes())
+    photos, renders, _ = zip(*(np.split(comparison_picture(scene, view), 3, 1) for view in chosen), strict=True)
+    picture = np.concatenate([np.concatenate(photos, 1), np.concatenate(renders, 1)])
+    Image.fromarray(picture).save(arguments.picture, optimize=True)
 
 
 if __name__ == "__main__":

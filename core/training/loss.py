@@ -6,10 +6,11 @@ from torch import Tensor
 
 
 def pixel_loss(color: Tensor, coverage: Tensor, true_color: Tensor, true_alpha: Tensor, weight: float) -> Tensor:
-    """Mean squared error of the picture over the background (eq. 1), and of coverage.
+    """Mean squared error of the picture over white (eq. 1), and of coverage.
 
-    A photo over one background colour cannot tell the object from the background where both look alike; with an alpha
-    channel it can. Over a background b the error is (dC - dA b): its mean over black and white is dC^2 - dC dA + dA^2 / 2.
+    Over white the error is dC - dA, for an error dC of the colour and dA of the coverage: the two may cancel where the
+    object is as white as the background. The coverage's own error, which photos with an alpha channel tell, keeps them
+    apart.
 
     Args:
         color, true_color: [n, 3], times coverage or alpha.

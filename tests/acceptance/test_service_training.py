@@ -31,7 +31,7 @@ FINISH_S = 300.0
 @pytest.fixture(scope="module")
 def capture(tmp_path_factory: pytest.TempPathFactory) -> Files:
     folder = tmp_path_factory.mktemp("sample")
-    write_sample_capture(folder, size_px=80, train_views=24, test_views=4)
+    write_sample_capture(folder, size_px=80, train_views=24, test_views=10)
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 

@@ -59,8 +59,8 @@ LIMITS: dict[str, tuple[float, float]] = {
 }
 
 PRESETS: dict[str, Settings] = {
-    "draft": Settings("draft", cells=64, patch=5, nodes=96, voxel_steps=1500, field_steps=500, texel_steps=800),
-    "balanced": Settings("balanced", cells=96, patch=7, nodes=192, voxel_steps=4000, field_steps=1500, texel_steps=4000),
+    "draft": Settings("draft", cells=64, patch=5, nodes=96, voxel_steps=800, field_steps=250, texel_steps=500),
+    "balanced": Settings("balanced", cells=96, patch=7, nodes=192, voxel_steps=2500, field_steps=1500, texel_steps=3500),
     "high": Settings("high", cells=128, patch=9, nodes=256, voxel_steps=8000, field_steps=4000, texel_steps=12000),
 }
 

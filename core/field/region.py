@@ -24,6 +24,9 @@ SEARCH_VIEWS = 32  # for the box; the hull itself is carved by all photos
 SEARCH_REACH = 0.95
 # What fewer photos than this share see cannot be reconstructed.
 SEEN_SHARE = 0.1
+# The box is drawn around what half of the photos see. (With a tenth, the cone that the object hides from the highest
+# cameras counts too, and the box of a capture from above grows threefold.)
+SEARCH_SHARE = 0.5
 # Without alpha: of the median camera distance, what is taken for the object.
 REACH_WITHOUT_ALPHA = 0.5
 # Room around the hull, so that vertices at its rim can move outwards.
@@ -54,12 +57,18 @@ def find_region(capture: Capture) -> Region:
     frame = Frame(centre, SEARCH_REACH * float(distances.min()))
     some = capture.train[:: max(1, len(capture.train) // SEARCH_VIEWS)]
     for cells in SEARCH_CELLS:
-        frame = _enclosing(frame, visual_hull(some, frame, cells))
+        frame = _enclosing(frame, visual_hull(some, frame, cells, SEARCH_SHARE))
     return Region(frame, visual_hull(capture.train, frame))
 
 
-def visual_hull(views: Sequence[View], frame: Frame, cells: int = HULL_CELLS) -> np.ndarray:
-    """[cells]^3 bool: cells of the cube that no photo shows to be empty. Conservative: thin parts stay."""
+def visual_hull(
+    views: Sequence[View], frame: Frame, cells: int = HULL_CELLS, share: float = SEEN_SHARE
+) -> np.ndarray:
+    """[cells]^3 bool: cells of the cube that no photo shows to be empty. Conservative: thin parts stay.
+
+    Args:
+        share: of the photos, that a cell must be within.
+    """
     ticks = (np.arange(cells) + 0.5) * (2.0 / cells) - 1.0
     points = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), -1).reshape(-1, 3)
     points = torch.from_numpy(frame.to_object(points).astype(np.float32))
@@ -71,7 +80,7 @@ def visual_hull(views: Sequence[View], frame: Frame, cells: int = HULL_CELLS) ->
         inside, filled = _look(view, points[index], radius)
         seen[index] += inside
         alive[index] &= filled | ~inside
-    alive &= seen >= max(2, SEEN_SHARE * len(views))
+    alive &= seen >= max(2, share * len(views))
     return alive.reshape(cells, cells, cells).numpy()
 
 

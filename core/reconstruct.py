@@ -64,9 +64,8 @@ def reconstruct(
         CaptureEmpty, TrainingFailed, CheckpointInvalid, OptionInvalid
     """
     resolved = resolve_device(device)
-    run = _Run(capture, settings, resolved, seed, checkpoint_dir, progress)
     with _one_torch_thread(resolved):
-        return run.reconstruction()
+        return _Run(capture, settings, resolved, seed, checkpoint_dir, progress).reconstruction()
 
 
 @contextmanager

@@ -91,6 +91,8 @@ class VoxelField:
 
 def _active_nodes(occupied: Tensor, nodes: int) -> Tensor:
     """Indices of the nodes that samples in occupied cells may read."""
-    grid = functional.interpolate(occupied.float()[None, None], size=(nodes,) * 3, mode="nearest")
+    # The pool misses no cell, also where there are more cells than nodes; a node's share of the cube is then up to one
+    # spacing beside the node, and interpolation reaches one further.
+    grid = functional.adaptive_max_pool3d(occupied.float()[None, None], nodes)
     near = functional.max_pool3d(grid, 5, 1, 2).reshape(-1) > 0
     return near.nonzero()[:, 0].to(torch.int32)

@@ -28,7 +28,12 @@ def create_app(settings: ServiceSettings) -> FastAPI:
         app.state.jobs.close()
 
     app = FastAPI(
-        title="Polyfield", description="Photos in, a .glb with view-dependent appearance out.", lifespan=lifespan
+        title="Polyfield",
+        description="Photos in, a .glb with view-dependent appearance out.",
+        lifespan=lifespan,
+        # FastAPI's own pages load their scripts from elsewhere; /openapi.json says the same.
+        docs_url=None,
+        redoc_url=None,
     )
     app.state.settings = settings
     problems.install(app)

@@ -49,3 +49,12 @@ async def test_other_files_are_problems(tmp_path: Path, viewer: Path, path: str)
 async def test_service_without_pages_has_its_api(tmp_path: Path) -> None:
     assert (await get(tmp_path, None, "/health")).status_code == 200
     assert (await get(tmp_path, None, "/")).status_code == 404
+
+
+@pytest.mark.parametrize("path", ["/docs", "/redoc"])
+async def test_no_page_loads_scripts_from_elsewhere(tmp_path: Path, viewer: Path, path: str) -> None:
+    assert (await get(tmp_path, viewer, path)).status_code == 404
+
+
+async def test_interface_is_described(tmp_path: Path, viewer: Path) -> None:
+    assert "/jobs/{job_id}/events" in (await get(tmp_path, viewer, "/openapi.json")).json()["paths"]

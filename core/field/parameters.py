@@ -60,13 +60,13 @@ class Parameters:
         return state
 
     def rows(self, index: Tensor) -> dict[str, Tensor]:
-        """What a checkpoint keeps of some entries; moments as bfloat16, which has float32's range in half the bytes."""
-        m = [moment[index].to(torch.bfloat16) for moment in self.moments]
-        return {"scalar": self.scalar[index], "features": self.features[index], **{f"m{i}": x for i, x in enumerate(m)}}
+        """What a checkpoint keeps of some entries."""
+        moments = {f"m{i}": moment[index] for i, moment in enumerate(self.moments)}
+        return {"scalar": self.scalar[index], "features": self.features[index], **moments}
 
     def restore_rows(self, index: Tensor, rows: dict[str, Tensor]) -> None:
         """Puts back what `rows` returned."""
         self.scalar[index] = rows["scalar"].to(self.scalar.device)
         self.features[index] = rows["features"].to(self.scalar.device)
         for i, moment in enumerate(self.moments):
-            moment[index] = rows[f"m{i}"].to(moment.device, torch.float32)
+            moment[index] = rows[f"m{i}"].to(moment.device)

@@ -24,7 +24,7 @@ from core.training.stage import Stage
 DENSITY_RATE, FEATURE_RATE, NETWORK_RATE = 0.08, 0.03, 5e-3
 FINAL_RATE = 0.1  # rates fall to this share, exponentially
 DENSITY_DECAY = 0.05  # empty space must cost something; falls to nothing
-OCCUPANCY_INTERVAL = 50
+OCCUPANCY_INTERVAL = 100
 SMALLEST_IMAGE_PX = 100
 PIXELS_PER_NODE = 1.5  # photos finer than the grid teach it nothing
 

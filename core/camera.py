@@ -6,7 +6,7 @@ import numpy as np
 
 from core.errors import PoseNotFinite, PoseNotRigid, PosesInvalid
 
-# Poses come with 6 to 8 digits from files, and some tools orthonormalise loosely; a reflection or a scale is far outside.
+# Poses come with 6 to 8 digits from files, and some tools orthonormalise loosely; a mirroring or a scale is far off.
 RIGID_TOLERANCE = 1e-3
 
 

@@ -20,9 +20,9 @@ NETWORK_HIDDEN = 16
 NETWORK_OUTPUTS = 3
 MAX_PAGE_SIZE_PX = 4096  # the largest texture every WebGL2 phone accepts (supplement F)
 
-# The anti-aliased pixel. A pixel has four sub-pixels, at these offsets from its centre (pixels). Its features are the mean
-# over the *covered* sub-pixels, it is shaded once with the ray through its centre, and it covers the background by the
-# covered share. Training, reference renderer and shaders all use this one definition.
+# The anti-aliased pixel. A pixel has four sub-pixels, at these offsets from its centre (pixels). Its features are the
+# mean over the *covered* sub-pixels, it is shaded once with the ray through its centre, and it covers the background by
+# the covered share. Training, reference renderer and shaders all use this one definition.
 SUBPIXEL_OFFSETS_PX = np.array([[-0.25, -0.25], [0.25, -0.25], [-0.25, 0.25], [0.25, 0.25]])
 
 # The object frame of NeRF-synthetic and nerfstudio captures has +z up: (x, y, z) -> (x, z, -y).

@@ -5,6 +5,7 @@ Every knob is a number, so that the command line and the API can override any of
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 from core.errors import OptionInvalid, UnknownPreset
 
@@ -60,7 +61,9 @@ LIMITS: dict[str, tuple[float, float]] = {
 
 PRESETS: dict[str, Settings] = {
     "draft": Settings("draft", cells=64, patch=5, nodes=96, voxel_steps=800, field_steps=250, texel_steps=500),
-    "balanced": Settings("balanced", cells=96, patch=7, nodes=160, voxel_steps=2000, field_steps=1000, texel_steps=3000),
+    "balanced": Settings(
+        "balanced", cells=96, patch=7, nodes=160, voxel_steps=2000, field_steps=1000, texel_steps=3000
+    ),
     "high": Settings("high", cells=128, patch=9, nodes=256, voxel_steps=8000, field_steps=4000, texel_steps=12000),
 }
 
@@ -78,9 +81,9 @@ def settings_for(preset: str, **overrides: object) -> Settings:
     return replace(PRESETS[preset], **_numbers(overrides))
 
 
-def _numbers(overrides: Mapping[str, object]) -> dict[str, float]:
+def _numbers(overrides: Mapping[str, object]) -> dict[str, Any]:
     kinds = {field.name: field.type for field in fields(Settings) if field.name != "preset"}
-    numbers: dict[str, float] = {}
+    numbers: dict[str, Any] = {}
     for name, value in overrides.items():
         if name not in kinds:
             raise OptionInvalid(f"option {name}", f"must be one of {', '.join(kinds)}", "an unknown name")

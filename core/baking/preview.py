@@ -49,4 +49,3 @@ def preview_of_field(
 def _small(camera: Camera) -> Camera:
     share = min(1.0, PREVIEW_SIZE_PX / max(camera.size_px))
     return camera.resized((max(1, round(camera.size_px[0] * share)), max(1, round(camera.size_px[1] * share))))
-

@@ -41,7 +41,7 @@ def look_from(
     """
     rasteriser = Rasteriser(scene, device)
     seen = [np.zeros(page.features_u8.shape[:2], bool) for page in scene.pages]
-    sums = [np.zeros((mask.size, 4)) for mask in seen]
+    sums = [np.zeros((*mask.shape, 4)) for mask in seen]
     rng = np.random.default_rng([seed, 3])
     for done, camera in enumerate(cameras):
         samples = subpixel_camera(camera)
@@ -50,20 +50,18 @@ def look_from(
         drawn = rng.random(len(rows)) < COLOR_SAMPLES_PER_VIEW / max(len(rows), 1)
         directions = samples.directions(np.stack([columns[drawn], rows[drawn]], -1) + 0.5)
         page_of = view.page[rows, columns]
-        texel = view.row[rows, columns], view.column[rows, columns]
+        texel_row, texel_column = view.row[rows, columns], view.column[rows, columns]
         for index, page in enumerate(scene.pages):
             here = page_of == index
-            seen[index][texel[0][here], texel[1][here]] = True
+            seen[index][texel_row[here], texel_column[here]] = True
             some = here[drawn]
-            y, x = (axis[drawn][some] for axis in texel)
+            y, x = texel_row[drawn][some], texel_column[drawn][some]
             colors = _shaded(page.features_u8[y, x], directions[some], shader, device)
-            flat = y * seen[index].shape[1] + x
-            for channel, values in enumerate([*colors.T, np.ones(len(flat))]):
-                sums[index][:, channel] += np.bincount(flat, values, len(sums[index]))
+            np.add.at(sums[index], (y, x), np.column_stack([colors, np.ones(len(colors))]))
         report((done + 1) / len(cameras))
     with np.errstate(invalid="ignore"):
-        means = [(total[:, :3] / total[:, 3:]).astype(np.float32) for total in sums]
-    return Seen(tuple(seen), tuple(mean.reshape(*mask.shape, 3) for mean, mask in zip(means, seen, strict=True)))
+        means = tuple((total[..., :3] / total[..., 3:]).astype(np.float32) for total in sums)
+    return Seen(tuple(seen), means)
 
 
 def _shaded(

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -44,7 +45,7 @@ class Frame:
         return array
 
 
-def as_vec3(tensor: Tensor) -> wp.array:
+def as_vec3(tensor: Tensor) -> Any:
     return wp.from_torch(tensor, dtype=wp.vec3)
 
 

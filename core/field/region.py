@@ -1,7 +1,7 @@
 """Where the object is: the training frame, and the cells that it may fill (its visual hull).
 
-Photos with an alpha channel say it outright: a cell that some photo sees only as transparent is empty. Without alpha the
-region is the cube around the point that all cameras look at.
+Photos with an alpha channel say it outright: a cell that some photo sees only as transparent is empty. Without alpha
+the region is the cube around the point that all cameras look at.
 """
 
 from collections.abc import Sequence
@@ -61,17 +61,15 @@ def find_region(capture: Capture) -> Region:
     return Region(frame, visual_hull(capture.train, frame))
 
 
-def visual_hull(
-    views: Sequence[View], frame: Frame, cells: int = HULL_CELLS, share: float = SEEN_SHARE
-) -> np.ndarray:
+def visual_hull(views: Sequence[View], frame: Frame, cells: int = HULL_CELLS, share: float = SEEN_SHARE) -> np.ndarray:
     """[cells]^3 bool: cells of the cube that no photo shows to be empty. Conservative: thin parts stay.
 
     Args:
         share: of the photos, that a cell must be within.
     """
     ticks = (np.arange(cells) + 0.5) * (2.0 / cells) - 1.0
-    points = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), -1).reshape(-1, 3)
-    points = torch.from_numpy(frame.to_object(points).astype(np.float32))
+    grid = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), -1).reshape(-1, 3)
+    points = torch.from_numpy(frame.to_object(grid).astype(np.float32))
     radius = np.sqrt(3.0) / cells * frame.half
     alive = torch.ones(len(points), dtype=torch.bool)
     seen = torch.zeros(len(points), dtype=torch.int32)

@@ -3,8 +3,8 @@
 Symbols: a sample n of a ray has opacity a_n = 1 - exp(-relu(raw) * density_scale * step), transmittance
 T_n = prod_{m<n} (1 - a_m), weight w_n = T_n a_n. A ray yields F = sum w_n f_n and A = sum w_n (eq. 2).
 
-Gradient without division: with s_n = dL/dw_n and B_n = what lies behind (B_last = 0, B_{n-1} = a_n s_n + (1 - a_n) B_n),
-dL/da_n = T_n (s_n - B_n).
+Gradient without division: with s_n = dL/dw_n and B_n = what lies behind (B_last = 0,
+B_{n-1} = a_n s_n + (1 - a_n) B_n), dL/da_n = T_n (s_n - B_n).
 """
 
 import warp as wp

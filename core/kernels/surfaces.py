@@ -1,4 +1,4 @@
-"""The two surfaces that a traced mesh can wear: a volume sampled where rays hit (field stage), and texels (texel stage)."""
+"""The two surfaces that a traced mesh can wear: a volume sampled where rays hit (field stage), and its texels."""
 
 import warp as wp
 

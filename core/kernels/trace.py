@@ -1,8 +1,8 @@
 """Ray tracing a quad mesh whose vertices stay within their cells (supplement G).
 
-A ray walks through the cells of the P grid (Amanatides and Woo 1987). Each kept cell lists the at most twelve quads that
-use its vertex; a hit counts only if it lies within that cell's stretch of the ray. A quad lies in the block of its four
-cells, so every hit is found exactly once and in order.
+A ray walks through the cells of the P grid (Amanatides and Woo 1987). Each kept cell lists the at most twelve quads
+that use its vertex; a hit counts only if it lies within that cell's stretch of the ray. A quad lies in the block of its
+four cells, so every hit is found exactly once and in order.
 
 Triangles are hit by edge functions in a frame aligned with the ray; the two triangles of a quad share its diagonal, so
 that no ray slips between them.

@@ -11,11 +11,9 @@ import torch
 import warp as wp
 from torch import Tensor, nn
 
-from core.capture import Capture
 from core.field.frame import as_vec3, empty
 from core.field.network import shade
 from core.field.parameters import Parameters
-from core.field.region import Region
 from core.field.voxels import DENSITY_SCALE, VoxelField
 from core.kernels.adam import adam_vertices, bias_correction
 from core.kernels.launch import accumulator_parts, launch
@@ -112,10 +110,8 @@ class FieldStage(Stage):
         loss = loss + share * pixel_loss(color_binary, A_binary, batch.color, batch.alpha, weight)
         falling = FINAL_RATE**self.fraction
         self.optimize_network(loss, NETWORK_RATE * falling)
-        n = float(self.settings.field_batch)
-        grads = (F.grad * n, A.grad * n), (F_binary.grad * n, A_binary.grad * n)
-        parts = self.parameters.parts
-        self._tracer.backward(batch, self._volume, *grads, self._gradients, parts)
+        soft, hard = (tuple(self.gradient(x, len(A)) for x in pair) for pair in ((F, A), (F_binary, A_binary)))
+        self._tracer.backward(batch, self._volume, soft, hard, self._gradients, self.parameters.parts)
         rates = (ALPHA_RATE * falling, FEATURE_RATE * falling)
         step_grid(self.parameters, wp.from_torch(self.active), self._touched, rates, 0.0, (0.0, 1.0),
                   self.done + 1, self.device)  # fmt: skip

@@ -1,5 +1,7 @@
 """Marches batches of rays through a voxel field and back, with buffers that grow where a ray needs more samples."""
 
+from typing import Any
+
 import torch
 import warp as wp
 from torch import Tensor
@@ -83,7 +85,7 @@ class Marcher:
 
 def step_grid(
     parameters: Parameters,
-    active: wp.array,
+    active: Any,
     touched: Tensor,
     rates: tuple[float, float],
     decay: float,

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -53,8 +54,8 @@ class PixelPool:
         self._starts = np.concatenate([[0], np.cumsum(sizes)])
         self._widths = np.array([camera.size_px[0] for camera in cameras])
         self._pool = _worth_drawing(images, np.random.default_rng([seed, 1]))
-        self._sub_offsets = wp.array(SUBPIXEL_OFFSETS_PX.astype(np.float32), dtype=wp.vec2, device=device)
-        self._no_offset = wp.zeros(1, dtype=wp.vec2, device=device)
+        self._sub_offsets: Any = wp.array(SUBPIXEL_OFFSETS_PX.astype(np.float32), dtype=wp.vec2, device=device)
+        self._no_offset: Any = wp.zeros(1, dtype=wp.vec2, device=device)
 
     def draw(self, rng: np.random.Generator, count: int, *, supersampled: bool) -> Batch:
         """`count` pixels: with four sub-rays each, or with one ray somewhere within each pixel."""
@@ -64,15 +65,15 @@ class PixelPool:
         point = np.stack([local % self._widths[image], local // self._widths[image]], -1) + 0.5
         if not supersampled:
             point = point + rng.random((count, 2)) - 0.5
-        images = wp.array(image.astype(np.int32), dtype=wp.int32, device=self.device)
-        points = wp.array(point.astype(np.float32), dtype=wp.vec2, device=self.device)
+        images: Any = wp.array(image.astype(np.int32), dtype=wp.int32, device=self.device)
+        points: Any = wp.array(point.astype(np.float32), dtype=wp.vec2, device=self.device)
         origins, directions = self._rays(images, points, self._sub_offsets if supersampled else self._no_offset)
         centres = self._rays(images, points, self._no_offset)[1] if supersampled else directions
         rgba = self._pixels[torch.from_numpy(index).to(self.device)].float() / 255.0
         alpha = rgba[:, 3]
         return Batch(origins, directions, centres, rgba[:, :3] * alpha[:, None], alpha)
 
-    def _rays(self, images: wp.array, points: wp.array, offsets: wp.array) -> tuple[Tensor, Tensor]:
+    def _rays(self, images: Any, points: Any, offsets: Any) -> tuple[Tensor, Tensor]:
         n = len(images) * len(offsets)
         origins, directions = empty(n, 3, device=self.device), empty(n, 3, device=self.device)
         inputs = [self._cameras, images, points, offsets, as_vec3(origins), as_vec3(directions)]

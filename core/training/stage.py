@@ -56,6 +56,12 @@ class Stage(ABC):
         self._errors = [*self._errors[-RECENT + 1 :], error]
         self.done += 1
 
+    @staticmethod
+    def gradient(tensor: torch.Tensor, pixels: int) -> torch.Tensor:
+        """The gradient of a leaf in units of a single pixel's loss, so that rates do not depend on the batch size; zero
+        where the loss does not depend on the leaf."""
+        return torch.zeros_like(tensor) if tensor.grad is None else tensor.grad * float(pixels)
+
     @abstractmethod
     def step(self, rng: np.random.Generator) -> float:
         """Trains on one batch; returns its mean squared colour error."""

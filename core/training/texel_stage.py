@@ -1,7 +1,7 @@
 """Stage 2b: the texels themselves. What is trained here is what is shipped.
 
-Four sub-rays a pixel look up the nearest texel, as the viewer will. Both models at first, then the binary one alone, and
-in the end with opacity frozen (eq. 21).
+Four sub-rays a pixel look up the nearest texel, as the viewer will. Both models at first, then the binary one alone,
+and in the end with opacity frozen (eq. 21).
 """
 
 from typing import Any
@@ -97,15 +97,13 @@ class TexelStage(Stage):
         loss = pixel_loss(color, A_binary, batch.color, batch.alpha, weight)
         if both:
             share = max(LEAST_BINARY_SHARE, self.fraction / CONTINUOUS_UNTIL)
-            soft = shade(self.network, F, A, batch.centre_directions)
-            loss = share * loss + (1.0 - share) * pixel_loss(soft, A, batch.color, batch.alpha, weight)
+            blended = shade(self.network, F, A, batch.centre_directions)
+            loss = share * loss + (1.0 - share) * pixel_loss(blended, A, batch.color, batch.alpha, weight)
         falling = FINAL_RATE**self.fraction
         self.optimize_network(loss, NETWORK_RATE * falling)
-        n = float(self.settings.texel_batch)
-        grads = [(_scaled(f, n), _scaled(a, n)) for f, a in ((F, A), (F_binary, A_binary))]
-        self._tracer.backward(
-            batch, self._texels, grads[0], grads[1], self._kernel_gradients(with_alpha), self.parameters.parts
-        )
+        soft, hard = (tuple(self.gradient(x, len(A)) for x in pair) for pair in ((F, A), (F_binary, A_binary)))
+        gradients = self._kernel_gradients(with_alpha)
+        self._tracer.backward(batch, self._texels, soft, hard, gradients, self.parameters.parts)
         self._adam(ALPHA_RATE * falling if with_alpha else 0.0, FEATURE_RATE * falling)
         return color_error(color, A_binary, batch.color, batch.alpha)
 
@@ -138,11 +136,6 @@ class TexelStage(Stage):
 
     def restore_own(self, state: dict[str, Any]) -> None:
         self._updates.copy_(state["updates"])
-
-
-def _scaled(tensor: Tensor, n: float) -> Tensor:
-    """The gradient times n; zero where the loss does not depend on the tensor."""
-    return torch.zeros_like(tensor) if tensor.grad is None else tensor.grad * n
 
 
 def _texel_points(mesh: QuadMesh, K: int) -> list[Tensor]:

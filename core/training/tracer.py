@@ -18,7 +18,9 @@ from core.training.pixels import Batch
 class Tracer:
     """Buffers for `pixels` pixels of `subrays` rays with at most `capacity` hits each; deeper hits are not seen."""
 
-    def __init__(self, mesh: QuadMesh, kernels: tuple[wp.Kernel, ...], pixels: int, subrays: int, capacity: int) -> None:
+    def __init__(
+        self, mesh: QuadMesh, kernels: tuple[wp.Kernel, ...], pixels: int, subrays: int, capacity: int
+    ) -> None:
         self.device = str(mesh.vertices.device)
         self.pixels, self.subrays = pixels, subrays
         self.kernel_mesh = mesh.kernel_mesh(self.device)
@@ -45,8 +47,8 @@ class Tracer:
         self,
         batch: Batch,
         surface: Any,
-        grad_continuous: tuple[Tensor, Tensor],
-        grad_binary: tuple[Tensor, Tensor],
+        grad_continuous: tuple[Tensor, ...],
+        grad_binary: tuple[Tensor, ...],
         gradients: Any,
         parts: int,
     ) -> None:

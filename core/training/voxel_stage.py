@@ -90,10 +90,9 @@ class VoxelStage(Stage):
         loss = pixel_loss(color, A, batch.color, batch.alpha, self.settings.coverage)
         falling = FINAL_RATE**self.fraction
         self.optimize_network(loss, NETWORK_RATE * falling)
-        # The photos' noise floor moves the distortion's weight with the batch mean, not with the batch size.
         distortion = self.settings.distortion if level is not self._levels[0] else 0.0
-        n = float(level.batch)
-        self.marcher.backward(batch.origins, batch.directions, F.grad * n, A.grad * n, distortion)
+        grads = self.gradient(F, level.batch), self.gradient(A, level.batch)
+        self.marcher.backward(batch.origins, batch.directions, *grads, distortion)
         rates = (DENSITY_RATE * falling, FEATURE_RATE * falling)
         decay = DENSITY_DECAY * (1.0 - self.fraction)
         self.marcher.adam(rates, decay, (EMPTY_DENSITY, HIGHEST_DENSITY), self._steps_here)

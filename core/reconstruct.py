@@ -37,7 +37,7 @@ PREVIEW_INTERVAL_S = 20.0
 class Reconstruction:
     """Attributes:
     scene: what to export.
-    seconds: per stage (voxels, field, texels, bake), including what an interrupted run spent on them.
+    seconds: per stage (region, voxels, field, texels, bake), including what an interrupted run spent on them.
     resumed: whether the run went on from a checkpoint.
     """
 
@@ -93,11 +93,12 @@ class _Run:
         progress: ProgressCallback,
     ) -> None:
         self.capture, self.settings, self.device, self.seed = capture, settings, device, seed
-        self.region: Region = find_region(capture)
-        self.network: nn.Sequential = new_network(seed).to(device)
         self._progress = progress
         self._checkpoint = CheckpointFile(checkpoint_dir, _identity(capture, settings, seed))
         self._seconds: dict[str, float] = {}
+        with self._timed("region"):
+            self.region: Region = find_region(capture)
+        self.network: nn.Sequential = new_network(seed).to(device)
         self._reported_at = self._previewed_at = time.monotonic()
 
     def reconstruction(self) -> Reconstruction:
@@ -105,12 +106,14 @@ class _Run:
         stage_name, state = saved or ("voxels", None)
         if state is not None:
             self._seconds = dict(state["seconds"])
-        pool = PixelPool(self.capture.train, self.region.frame, self.device, seed=self.seed)
+        with self._timed("region"):
+            pool = PixelPool(self.capture.train, self.region.frame, self.device, seed=self.seed)
         common = self.network, self.settings, self.seed, self.device
         if stage_name == "voxels":
             voxels = VoxelStage(self.capture, self.region, *common)
             self._train(voxels, state)
-            field = FieldStage.after(voxels, pool)
+            with self._timed("field"):
+                field = FieldStage.after(voxels, pool)
             del voxels
             state = None
         elif stage_name == "field":
@@ -118,7 +121,8 @@ class _Run:
             field = FieldStage.restored(pool, state, *common)
         if stage_name in ("voxels", "field"):
             self._train(field, None)
-            texels = TexelStage.after(field, pool)
+            with self._timed("texels"):
+                texels = TexelStage.after(field, pool)
             del field
         else:
             assert state is not None
@@ -140,10 +144,14 @@ class _Run:
                 self._checkpoint.write(stage.name, {**stage.state(), "seconds": self._seconds})
 
     def _baked(self, texels: TexelStage) -> BakedScene:
+        with self._timed("bake"):
+            return bake(texels, self.capture, self.region.frame, lambda share: self._tell("bake", share, texels.psnr))
+
+    @contextmanager
+    def _timed(self, name: str) -> Iterator[None]:
         start = time.monotonic()
-        scene = bake(texels, self.capture, self.region.frame, lambda share: self._tell("bake", share, texels.psnr))
-        self._seconds["bake"] = time.monotonic() - start
-        return scene
+        yield
+        self._seconds[name] = self._seconds.get(name, 0.0) + time.monotonic() - start
 
     def _report(self, stage: Stage) -> None:
         now = time.monotonic()

@@ -58,7 +58,7 @@ def test_figures_are_those_of_the_written_asset(capture: Path, out: Path, report
 
 def test_report_tells_sizes_seconds_and_settings(out: Path, report: Report) -> None:
     assert report.bytes == {name: (out / name).stat().st_size for name in ("scene.glb", "preview.png")}
-    assert set(report.seconds) == {"read", "voxels", "field", "texels", "bake", "export", "measure", "total"}
+    assert set(report.seconds) == {"read", "region", "voxels", "field", "texels", "bake", "export", "measure", "total"}
     assert report.settings.items() >= TINY.items()
     assert (report.settings["preset"], report.settings["seed"], report.device) == ("draft", 0, "cpu")
     assert report.views == {"train": 8, "test": 2}

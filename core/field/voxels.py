@@ -74,9 +74,7 @@ class VoxelField:
         self.parameters.scalar[~near.reshape(-1)] = EMPTY_DENSITY
         found = functional.adaptive_max_pool3d(kept.float()[None, None], cells)[0, 0] > 0
         occupied = _over_neighbours(found, torch.logical_or, False)
-        allowed = torch.from_numpy(hull.astype(np.float32)).to(occupied.device)[None, None]
-        allowed = functional.interpolate(allowed, size=(cells,) * 3, mode="nearest")[0, 0] > 0
-        self.occupied = occupied & allowed
+        self.occupied = occupied & _on_grid(torch.from_numpy(hull).to(occupied.device), cells)
         self.active = _active_nodes(self.occupied, n)
 
     def grid(self) -> VoxelGrid:
@@ -91,10 +89,27 @@ class VoxelField:
 
 
 def _active_nodes(occupied: Tensor, nodes: int) -> Tensor:
-    """Indices of the nodes that samples in occupied cells may read."""
-    near = _over_neighbours(occupied, torch.logical_or, False).float()[None, None]
-    grid = functional.interpolate(near, size=(nodes,) * 3, mode="nearest")
-    return (grid.reshape(-1) > 0).nonzero()[:, 0].to(torch.int32)
+    """Indices of exactly the nodes that samples in occupied cells may read: those that train."""
+    cells, i = occupied.shape[0], torch.arange(nodes, device=occupied.device)
+    # Node i is read between nodes i - 1 and i + 1. Cells and nodes share no grid: there may be more of either.
+    first, last = (i - 1) * cells // (nodes - 1), -(-(i + 1) * cells // (nodes - 1)) - 1
+    return _any_in(occupied, first.clamp_min(0), last.clamp_max(cells - 1)).reshape(-1).nonzero()[:, 0].to(torch.int32)
+
+
+def _on_grid(hull: Tensor, cells: int) -> Tensor:
+    """[cells]^3 bool: the cells that overlap a cell of the hull."""
+    i, n = torch.arange(cells, device=hull.device), hull.shape[0]
+    return _any_in(hull, i * n // cells, -(-(i + 1) * n // cells) - 1)
+
+
+def _any_in(grid: Tensor, first: Tensor, last: Tensor) -> Tensor:
+    """[m, m, m] bool: whether any entry of a [n, n, n] grid is true from first[i] to last[i] along each axis."""
+    for axis in range(3):
+        found = grid.index_select(axis, first)
+        for step in range(1, int((last - first).max()) + 1):
+            found |= grid.index_select(axis, torch.minimum(first + step, last))
+        grid = found
+    return grid
 
 
 def _over_neighbours(grid: Tensor, combine: Callable[..., Tensor], outside: float | bool) -> Tensor:

@@ -1,0 +1,121 @@
+"""Training pixels: their rays and their colours."""
+
+import numpy as np
+import pytest
+import torch
+
+from core.camera import Camera
+from core.capture import View
+from core.conventions import SUBPIXEL_OFFSETS_PX
+from core.field.frame import Frame
+from core.training.pixels import BACKGROUND_SHARE, PixelPool, camera_rays_of
+from tests.scenes import look_at_camera
+from tests.unit.training.captures import ball, capture_of
+
+FRAME = Frame(np.array([0.2, -0.1, 0.3]), 1.5)
+
+
+def marked_views(rng: np.random.Generator, sizes=((20, 14), (17, 23))) -> list[View]:
+    """Photos of unlike sizes and lenses; every pixel's colour is unique: its view, its column, its row."""
+    views = []
+    for index, (width, height) in enumerate(sizes):
+        camera = look_at_camera(f"{index}", rng.normal(size=3) * 3, size_px=(width, height))
+        lens = Camera(camera.name, camera.world_from_camera, (21.0, 25.0), (9.3, 7.9), (width, height))
+        column, row = np.meshgrid(np.arange(width), np.arange(height))
+        alpha = rng.integers(1, 256, (height, width))
+        pixels = np.stack([np.full_like(column, index), column, row, alpha], -1)
+        views.append(View(lens, pixels.astype(np.uint8)))
+    return views
+
+
+def marks(batch) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(view, column, row) of a batch's pixels."""
+    straight = batch.color.cpu() / batch.alpha.cpu()[:, None] * 255
+    return tuple(np.rint(straight.numpy()).astype(int).T)
+
+
+def exact_directions(views: list[View], view, column, row, offset) -> np.ndarray:
+    points = np.stack([column, row], -1) + 0.5 + offset
+    return np.stack([views[v].camera.directions(p) for v, p in zip(view, points, strict=True)])
+
+
+def test_sub_rays_pass_through_the_four_sub_pixels_of_their_pixel(rng, device):
+    views = marked_views(rng)
+    batch = PixelPool(views, FRAME, device).draw(rng, 300, supersampled=True)
+    place = marks(batch)
+    assert set(place[0]) == {0, 1}
+    directions = batch.directions.cpu().numpy().reshape(300, 4, 3)
+    for s, offset in enumerate(SUBPIXEL_OFFSETS_PX):
+        # Unit vectors in float32.
+        np.testing.assert_allclose(directions[:, s], exact_directions(views, *place, offset), atol=1e-6)
+    np.testing.assert_allclose(batch.centre_directions.cpu(), exact_directions(views, *place, 0.0), atol=1e-6)
+    origins = np.stack([FRAME.to_cube(views[v].camera.position) for v in place[0]])
+    np.testing.assert_allclose(batch.origins.cpu().reshape(300, 4, 3), np.repeat(origins[:, None], 4, 1), atol=1e-6)
+
+
+def test_single_rays_fall_anywhere_within_their_pixel(rng, device):
+    views = marked_views(rng)
+    batch = PixelPool(views, FRAME, device).draw(rng, 500, supersampled=False)
+    view, column, row = marks(batch)
+    offsets = []
+    for index, direction in enumerate(batch.directions.cpu().numpy().astype(float)):
+        camera = views[view[index]].camera
+        local = direction @ camera.world_from_camera[:3, :3]
+        xy = local[:2] / -local[2] * camera.focal_px * np.array([1, -1]) + camera.centre_px
+        offsets.append(xy - [column[index] + 0.5, row[index] + 0.5])
+    offsets = np.array(offsets)
+    assert np.abs(offsets).max() <= 0.5 + 1e-4  # float32 image points
+    np.testing.assert_allclose(offsets.std(0), np.sqrt(1 / 12), rtol=0.15)
+    np.testing.assert_array_equal(batch.centre_directions.cpu(), batch.directions.cpu())
+
+
+def test_colours_are_the_photos_times_their_alpha(rng):
+    views = marked_views(rng)
+    batch = PixelPool(views, FRAME, "cpu").draw(rng, 200, supersampled=False)
+    for v, x, y, color, alpha in zip(*marks(batch), batch.color, batch.alpha, strict=True):
+        premultiplied, expected = views[v].premultiplied()
+        np.testing.assert_allclose(color, premultiplied[y, x], atol=1e-6)
+        assert float(alpha) == pytest.approx(float(expected[y, x]))
+
+
+def test_photos_without_alpha_are_opaque_everywhere(rng):
+    capture = capture_of(ball(), alpha=False)
+    batch = PixelPool(capture.train, FRAME, "cpu").draw(rng, 500, supersampled=False)
+    assert bool((batch.alpha == 1.0).all())
+
+
+def test_smaller_photos_see_the_same_directions(rng):
+    """Pixels of a photo made smaller cover the photo exactly, also where its size is no multiple of the factor."""
+    views = marked_views(rng, sizes=((20, 14), (17, 23)))
+    cameras = PixelPool(views, FRAME, "cpu", factor=3)._cameras
+    expected = [(21 * 7 / 20, 25 * 5 / 14), (21 * 6 / 17, 25 * 8 / 23)]
+    np.testing.assert_allclose(cameras.focal_px.numpy(), expected, rtol=1e-6)
+
+
+def test_far_from_the_object_a_share_of_the_pixels_is_drawn(rng):
+    image = np.zeros((100, 100, 4), np.uint8)
+    image[40:60, 40:60] = 255
+    view = View(look_at_camera("", (0, -4, 0.1), size_px=(100, 100)), image)
+    pool = PixelPool([view], FRAME, "cpu")._pool
+    near = np.zeros((100, 100), bool)
+    near[38:62, 38:62] = True  # 2 % of the width around the object
+    assert np.isin(np.flatnonzero(near), pool).all()
+    share = (len(pool) - near.sum()) / (~near).sum()
+    assert share == pytest.approx(BACKGROUND_SHARE, abs=0.02)
+
+
+def test_the_same_generator_draws_the_same_pixels():
+    views = marked_views(np.random.default_rng(0))
+    one, same = (
+        PixelPool(views, FRAME, "cpu", seed=3).draw(np.random.default_rng(5), 50, supersampled=False) for _ in range(2)
+    )
+    assert torch.equal(one.directions, same.directions)
+    assert torch.equal(one.color, same.color)
+
+
+def test_rays_of_a_camera_pass_through_its_pixel_centres(rng, device):
+    camera = marked_views(rng)[0].camera
+    origins, directions = camera_rays_of(camera, FRAME, device)
+    expected = camera.directions(camera.pixel_centres()).reshape(-1, 3)
+    np.testing.assert_allclose(directions.cpu(), expected, atol=1e-6)
+    np.testing.assert_allclose(origins.cpu(), np.tile(FRAME.to_cube(camera.position), (len(expected), 1)), atol=1e-6)

@@ -1,7 +1,6 @@
 """Checkpoints: written whole or not at all, and read back only into the run that they belong to."""
 
 import os
-import pickle
 import time
 from pathlib import Path
 from typing import Any
@@ -60,15 +59,21 @@ class CheckpointFile:
             return None
         try:
             content = torch.load(self._path, map_location="cpu", weights_only=True)
-            if content["identity"] != self._identity:
-                return None
-            return content["stage"], content["state"]
-        except (OSError, RuntimeError, KeyError, ValueError, EOFError, pickle.UnpicklingError) as error:
+            if not isinstance(content, dict):
+                raise TypeError(f"a {type(content).__name__}")
+            identity, stage, state = (content[key] for key in ("identity", "stage", "state"))
+        except Exception as error:  # bytes that are not a checkpoint make torch.load raise almost anything
             raise CheckpointInvalid(
-                str(self._path), "must be a checkpoint", str(error).splitlines()[0][:200], "Delete it to start afresh."
+                str(self._path), "must be a checkpoint", _first_line(error), "Delete it to start afresh."
             ) from error
+        return (stage, state) if identity == self._identity else None
 
     def remove(self) -> None:
         """Removes the file, if any."""
         if self._path is not None:
             self._path.unlink(missing_ok=True)
+
+
+def _first_line(error: Exception) -> str:
+    lines = str(error).splitlines()
+    return lines[0][:200] if lines else type(error).__name__

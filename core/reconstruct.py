@@ -17,6 +17,7 @@ from core.baking.preview import preview_of_field, preview_of_scene
 from core.capture import Capture
 from core.checkpoint import CheckpointFile
 from core.device import resolve_device
+from core.errors import OptionInvalid
 from core.field.network import new_network
 from core.field.region import Region, find_region
 from core.presets import Settings
@@ -31,6 +32,7 @@ from core.training.voxel_stage import VoxelStage
 STAGE_SHARES = {"voxels": 0.35, "field": 0.30, "texels": 0.30, "bake": 0.05}
 REPORT_INTERVAL_S = 0.5
 PREVIEW_INTERVAL_S = 20.0
+MAX_SEED = 2**31 - 1
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,8 @@ def reconstruct(
     Raises:
         CaptureEmpty, TrainingFailed, CheckpointInvalid, OptionInvalid
     """
+    if not 0 <= seed <= MAX_SEED:
+        raise OptionInvalid("seed", f"must be between 0 and {MAX_SEED}", str(seed))
     resolved = resolve_device(device)
     with _one_torch_thread(resolved):
         return _Run(capture, settings, resolved, seed, checkpoint_dir, progress).reconstruction()

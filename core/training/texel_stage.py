@@ -11,6 +11,7 @@ import torch
 import warp as wp
 from torch import Tensor, nn
 
+from core.errors import TrainingFailed
 from core.field.network import shade
 from core.field.parameters import Parameters
 from core.kernels.adam import adam_texels
@@ -66,7 +67,13 @@ class TexelStage(Stage):
 
     @classmethod
     def after(cls, field: FieldStage, pool: PixelPool) -> "TexelStage":
-        """The stage that follows a finished field stage: its quads that are seen, with the volume baked onto them."""
+        """The stage that follows a finished field stage: its quads that are seen, with the volume baked onto them.
+
+        Raises:
+            TrainingFailed: no quad is seen.
+        """
+        if not field.seen.any():
+            raise TrainingFailed("mesh", "some quad must be seen", "none", "Check the poses and the background.")
         mesh = field.mesh.with_quads(field.seen.cpu().numpy())
         volume = volume_of(field.nodes, field.parameters)
         baked = [sampled(volume, points, field.device) for points in _texel_points(mesh, field.settings.patch)]

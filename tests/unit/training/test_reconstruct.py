@@ -11,14 +11,16 @@ import torch
 
 from core import reconstruct as module
 from core.baked import BakedScene
+from core.camera import Camera
 from core.capture import Capture
 from core.checkpoint import FILE_NAME, CheckpointFile
-from core.errors import CheckpointInvalid, TrainingFailed
+from core.errors import CheckpointInvalid, OptionInvalid, TrainingFailed
 from core.evaluation import evaluate
 from core.presets import Settings, settings_for
 from core.progress import Progress
 from core.reconstruct import STAGE_SHARES, Reconstruction, reconstruct
 from core.training import field_stage
+from core.training.tracer import Tracer
 from core.training.voxel_stage import VoxelStage
 from tests.unit.training.captures import ball, capture_of
 
@@ -232,6 +234,33 @@ def test_hopeless_captures_give_a_scene_or_say_what_is_wrong(body):
         capture = Capture(capture.train[:2], ())
     with contextlib.suppress(TrainingFailed):
         assert reconstruct(capture, HASTY, device="cpu").scene.quad_count > 0
+
+
+def test_a_mesh_that_no_ray_sees_ends_training(capture, monkeypatch):
+    monkeypatch.setattr(Tracer, "seen_quads", lambda self, least: torch.zeros(0, dtype=torch.int64))
+    with pytest.raises(TrainingFailed, match="seen"):
+        reconstruct(capture, HASTY, device="cpu")
+
+
+@pytest.mark.parametrize("seed", [-1, 2**31, 2**64])
+def test_seeds_out_of_range_are_refused(capture, seed):
+    with pytest.raises(OptionInvalid, match="seed"):
+        reconstruct(capture, HASTY, device="cpu", seed=seed)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_a_scene_of_any_size_is_learnt_alike(capture, scale):
+    views = tuple(replace(view, camera=scaled_camera(view.camera, scale)) for view in capture.train)
+    one, other = (reconstruct(c, HASTY, device="cpu").scene for c in (Capture(capture.train, ()), Capture(views, ())))
+    for page, scaled in zip(one.pages, other.pages, strict=True):
+        np.testing.assert_array_equal(scaled.features_u8, page.features_u8)
+        np.testing.assert_allclose(scaled.positions / scale, page.positions, atol=1e-6)  # float32 positions
+
+
+def scaled_camera(camera: Camera, scale: float) -> Camera:
+    pose = camera.world_from_camera.copy()
+    pose[:3, 3] *= scale
+    return replace(camera, world_from_camera=pose)
 
 
 def test_a_loss_that_is_no_number_ends_training(capture, monkeypatch):

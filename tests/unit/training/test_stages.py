@@ -14,7 +14,6 @@ from core.training.voxel_stage import levels_of
 from tests.unit.kernels.meshes import random_mesh, texels_of
 from tests.unit.kernels.rays import as_float32, batch_of, random_rays
 
-
 SMALLEST = settings_for("draft", nodes=16, voxel_steps=1, voxel_batch=64)
 
 

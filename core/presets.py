@@ -62,7 +62,7 @@ LIMITS: dict[str, tuple[float, float]] = {
 PRESETS: dict[str, Settings] = {
     "draft": Settings("draft", cells=64, patch=5, nodes=96, voxel_steps=800, field_steps=250, texel_steps=500),
     "balanced": Settings(
-        "balanced", cells=96, patch=7, nodes=160, voxel_steps=2000, field_steps=1000, texel_steps=3000
+        "balanced", cells=96, patch=7, nodes=160, voxel_steps=2000, field_steps=1000, texel_steps=4000
     ),
     "high": Settings("high", cells=128, patch=9, nodes=256, voxel_steps=8000, field_steps=4000, texel_steps=12000),
 }

@@ -26,7 +26,7 @@ from core.training.pixels import PixelPool
 from core.training.stage import Stage
 from core.training.tracer import Tracer
 
-FEATURE_RATE, ALPHA_RATE, NETWORK_RATE = 0.02, 0.02, 2e-3
+FEATURE_RATE, ALPHA_RATE, NETWORK_RATE = 0.01, 0.015, 2e-3
 FINAL_RATE = 0.1
 CONTINUOUS_UNTIL, OPACITY_UNTIL = 0.4, 0.75  # of the steps
 LEAST_BINARY_SHARE = 0.3

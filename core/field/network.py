@@ -13,17 +13,30 @@ from core.conventions import NETWORK_HIDDEN, NETWORK_INPUTS, NETWORK_OUTPUTS
 MIN_COVERAGE = 1e-4
 
 
+# The logit that features 0 and 1 start at: sigmoid(4) = 0.98 leaves room for highlights.
+COLOR_LOGIT = 4.0
+
+
 def new_network(seed: int) -> nn.Sequential:
-    """An untrained 11-16-16-3 network; the sigmoid is left to `shade`."""
+    """An untrained 11-16-16-3 network; the sigmoid is left to `shade`.
+
+    It starts by showing features 0..2 as red, green and blue; everything else is random. From an all-random start, hues
+    that are rare in the photos stay grey for thousands of steps.
+    """
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        return nn.Sequential(
-            nn.Linear(NETWORK_INPUTS, NETWORK_HIDDEN),
-            nn.ReLU(),
-            nn.Linear(NETWORK_HIDDEN, NETWORK_HIDDEN),
-            nn.ReLU(),
-            nn.Linear(NETWORK_HIDDEN, NETWORK_OUTPUTS),
-        )
+        first = nn.Linear(NETWORK_INPUTS, NETWORK_HIDDEN)
+        second = nn.Linear(NETWORK_HIDDEN, NETWORK_HIDDEN)
+        last = nn.Linear(NETWORK_HIDDEN, NETWORK_OUTPUTS)
+    with torch.no_grad():
+        for layer in (first, second):
+            layer.weight[:NETWORK_OUTPUTS] = 0.0
+            layer.weight[:NETWORK_OUTPUTS, :NETWORK_OUTPUTS].diagonal().fill_(1.0)
+            layer.bias[:NETWORK_OUTPUTS] = 0.0
+        last.weight[:, :NETWORK_OUTPUTS] = 0.0
+        last.weight[:, :NETWORK_OUTPUTS].diagonal().fill_(2.0 * COLOR_LOGIT)
+        last.bias.fill_(-COLOR_LOGIT)
+    return nn.Sequential(first, nn.ReLU(), second, nn.ReLU(), last)
 
 
 def shade(network: nn.Module, features: Tensor, coverage: Tensor, directions: Tensor) -> Tensor:

@@ -91,7 +91,8 @@ def _comparison(arguments: argparse.Namespace, options: Options, out: Path, devi
         )
     views = capture.test or capture.train
     view = views[arguments.view % len(views)]
-    return Image.fromarray(comparison_picture(read_glb((out / SCENE).read_bytes()), view, device=device))
+    picture = comparison_picture(read_glb((out / SCENE).read_bytes()), view, device=device)
+    return Image.fromarray(picture[:, view.camera.size_px[0] :] if arguments.without_photo else picture)
 
 
 def _name(capture: Path, options: Options) -> str:
@@ -106,6 +107,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("capture", type=Path)
     add_options(parser, preset="draft")
     parser.add_argument("--view", type=int, default=0, help="number of the held-out view in the picture")
+    parser.add_argument(
+        "--without-photo", action="store_true", help="leave the photo out of the picture: for photos that aren't ours"
+    )
     parser.add_argument("--name", default="", help="of the row; default: capture, preset and what else was chosen")
     parser.add_argument("--out", type=Path, help=f"folder of the conversion; default: in {OUT}")
     parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the table and the pictures")

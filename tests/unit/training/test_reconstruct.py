@@ -219,10 +219,12 @@ def test_a_damaged_checkpoint_is_refused(capture, tmp_path):
 
 @pytest.mark.parametrize("alpha", [True, False], ids=["rgba", "rgb"])
 @pytest.mark.parametrize("color", [(1, 1, 1), (0, 0, 0), (1, 0, 0)], ids=["white", "black", "red"])
-def test_objects_of_one_colour_give_a_scene_of_that_colour(color, alpha):
+def test_objects_of_one_colour_give_a_finite_picture(color, alpha):
     capture = capture_of(ball(color), alpha=alpha, views=8)
     scene = reconstruct(capture, HASTY, device="cpu").scene
-    assert np.isfinite(evaluate(scene, capture.test, device="cpu").psnr)
+    # NaN fails; a white ball on white is matched exactly, at infinity. So few steps leave the others far from done,
+    # photos without alpha farthest (8 dB).
+    assert evaluate(scene, capture.test, device="cpu").psnr > 5.0
 
 
 @pytest.mark.parametrize("body", ["speck", "one place", "two photos"])

@@ -95,7 +95,8 @@ async def delete_job(request: Request, job_id: str) -> Response:
     return Response(status_code=204)
 
 
-@router.api_route("/jobs/{job_id}/artifacts/{name}", methods=["GET", "HEAD"])
+@router.get("/jobs/{job_id}/artifacts/{name}")
+@router.head("/jobs/{job_id}/artifacts/{name}", include_in_schema=False)
 async def get_artifact(request: Request, job_id: str, name: str) -> Response:
     """`scene.glb`, `preview.png` or `report.json`; ranges and ETags are honoured."""
     return artifact_response(request, _jobs(request).folder(job_id), name)

@@ -31,6 +31,8 @@ from core.training.voxel_stage import VoxelStage
 # The stages' shares of the time, for the progress bar; measured on two cores, between draft and balanced.
 STAGE_SHARES = {"voxels": 0.20, "field": 0.22, "texels": 0.52, "bake": 0.06}
 REPORT_INTERVAL_S = 0.5
+# To be raised when a stage keeps other things: checkpoints of another format are ignored, not misread.
+CHECKPOINT_FORMAT = 1
 PREVIEW_INTERVAL_S = 20.0
 MAX_SEED = 2**31 - 1
 
@@ -190,4 +192,4 @@ def _identity(capture: Capture, settings: Settings, seed: int) -> dict[str, Any]
         digest.update(view.image_u8.tobytes())
         digest.update(view.camera.world_from_camera.tobytes())
         digest.update(str((view.camera.focal_px, view.camera.centre_px)).encode())
-    return {"settings": asdict(settings), "seed": seed, "capture": digest.hexdigest()}
+    return {"format": CHECKPOINT_FORMAT, "settings": asdict(settings), "seed": seed, "capture": digest.hexdigest()}

@@ -161,7 +161,9 @@ export class Stage {
     this.#gpu.end();
     this.onFrame();
     // Damped motion asks for its next frame itself, through the rig's change event.
-    const measuring = this.#unmeasured > 0 && performance.now() < this.#measureUntil;
+    // On a slow device the time is up before a second frame; without one there is no figure to show.
+    const unknown = Number.isNaN(this.#clock.medianMs);
+    const measuring = unknown || (this.#unmeasured > 0 && performance.now() < this.#measureUntil);
     if (this.#continuous || measuring) this.draw();
     else if (!this.#requested) this.#clock.pause();
   }

@@ -1,6 +1,5 @@
 """The baked scene: the one thing that exporters read and readers return. NumPy only."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -127,10 +126,6 @@ class BakedScene:
         """(lowest, highest) corner [3] float64 of all vertices, object frame."""
         points = np.concatenate([page.positions for page in self.pages]).astype(np.float64)
         return points.min(0), points.max(0)
-
-
-# Renders a scene: RGBA [height, width, 4] float in [0, 1], colour premultiplied by coverage.
-Renderer = Callable[[BakedScene, Camera], np.ndarray]
 
 
 def _sigmoid(x: np.ndarray) -> np.ndarray:

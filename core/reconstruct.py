@@ -121,7 +121,6 @@ class _Run:
             with self._timed("field"):
                 field = FieldStage.after(voxels, pool)
             del voxels
-            state = None
         elif stage_name == "field":
             assert state is not None
             field = FieldStage.restored(pool, state, *common)

@@ -7,7 +7,8 @@ import numpy as np
 
 from core.camera import Camera
 from core.conventions import ASSET_FROM_Z_UP
-from core.errors import CaptureEmpty, ImageSizeMismatch, TooFewImages
+from core.errors import CaptureEmpty, ImageSizeMismatch, PosesInvalid, TooFewImages
+from core.scene_kind import UNDECIDED, SceneKind, detect_kind
 
 MIN_TRAIN_IMAGES = 2
 WHITE = (1.0, 1.0, 1.0)
@@ -20,16 +21,36 @@ class View:
     Attributes:
         camera: its size is the image's.
         image_u8: [height, width, 3 or 4] uint8, sRGB, straight (not premultiplied) alpha.
+        ignored: [height, width] bool, pixels that a mask takes out of training and measuring; None for none. (Alpha is
+            another thing: it says that the object is not there.)
+        depth_range: (near, far), 0 < near <= far, along the optical axis in the camera's units; None if not known.
+
+    Raises:
+        ImageSizeMismatch, PosesInvalid
     """
 
     camera: Camera
     image_u8: np.ndarray
+    ignored: np.ndarray | None = None
+    depth_range: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        height, width = self.image_u8.shape[:2]
+        self._check_size("photo", self.image_u8)
+        if self.ignored is not None:
+            self._check_size("mask of photo", self.ignored)
+        if self.depth_range is not None and not 0 < self.depth_range[0] <= self.depth_range[1] < np.inf:
+            raise PosesInvalid(
+                f"depth bounds of {self.camera.name}",
+                "must be finite and positive, near before far",
+                str(self.depth_range),
+                "Correct the bounds, or leave them out.",
+            )
+
+    def _check_size(self, subject: str, image: np.ndarray) -> None:
+        height, width = image.shape[:2]
         if (width, height) != tuple(self.camera.size_px):
             raise ImageSizeMismatch(
-                f"photo {self.camera.name}",
+                f"{subject} {self.camera.name}",
                 "must have the size its camera states",
                 f"{width} x {height} px for a camera of {self.camera.size_px[0]} x {self.camera.size_px[1]} px",
                 "Use the photos that were posed, or correct the size in the pose file.",
@@ -60,8 +81,11 @@ class Capture:
     Attributes:
         train, test: views to learn from, and views held out to measure on (may be empty).
         background: sRGB in [0, 1], behind transparent pixels.
-        asset_from_object: [4, 4] float64, from the capture's frame to glTF's (+y up).
+        asset_from_object: [4, 4] float64, rigid with uniform scale: from the object frame to glTF's (+y up).
         notes: remarks for the user (photos left out, assumptions made).
+        user_from_object: [4, 4] float64, rigid with uniform scale: back to the frame of the user's files.
+        points: [n, 3] float64, sparse points of the scene's surfaces in the object frame; None where there are none.
+        kind: object, forward-facing or unbounded; detected where it is not given.
 
     Raises:
         TooFewImages, CaptureEmpty
@@ -72,6 +96,9 @@ class Capture:
     background: tuple[float, float, float] = WHITE
     asset_from_object: np.ndarray = field(default_factory=lambda: ASSET_FROM_Z_UP.copy())
     notes: tuple[str, ...] = ()
+    user_from_object: np.ndarray = field(default_factory=lambda: np.eye(4))
+    points: np.ndarray | None = None
+    kind: SceneKind = UNDECIDED
 
     def __post_init__(self) -> None:
         if len(self.train) < MIN_TRAIN_IMAGES:
@@ -88,6 +115,15 @@ class Capture:
                 f"{len(self.train)} photos that are fully transparent",
                 "Check the masks or the alpha channel of the photos.",
             )
+        if all(view.ignored is not None and view.ignored.all() for view in self.train):
+            raise CaptureEmpty(
+                "capture",
+                "at least one training photo must have pixels that no mask takes out",
+                f"{len(self.train)} photos that are masked entirely",
+                "Check the masks: black is left out, white is kept.",
+            )
+        if self.kind is UNDECIDED:
+            object.__setattr__(self, "kind", detect_kind(self))
 
     @property
     def has_alpha(self) -> bool:

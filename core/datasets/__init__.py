@@ -11,6 +11,8 @@ from core.datasets.listing import Listing
 from core.datasets.nerf_synthetic import TRAIN_FILE, list_nerf_synthetic
 from core.datasets.nerfstudio import list_nerfstudio
 from core.errors import OptionInvalid
+from core.normalisation import normalised
+from core.scene_kind import AUTO, chosen_kind
 
 __all__ = ["Listing", "check_capture", "read_capture"]
 
@@ -41,14 +43,16 @@ def read_capture(
     downscale: float = 1,
     background: tuple[float, float, float] = WHITE,
     skip_missing: bool = False,
+    kind: str = AUTO,
 ) -> Capture:
-    """A capture from disk, its photos undistorted and made smaller by area averaging.
+    """A capture from disk in the object frame, its photos undistorted and made smaller by area averaging.
 
     Args:
         path, skip_missing: as for `check_capture`, which runs first.
         max_size_px: longest side of a photo at most.
         downscale: sides are divided by it, >= 1. Of both limits the stricter one holds.
         background: sRGB in [0, 1], behind transparent pixels.
+        kind: of scene: "auto" (detected), "object", "forward" or "unbounded".
 
     Raises:
         what `check_capture` raises, and ImageUndecodable, CaptureEmpty, OptionInvalid
@@ -60,6 +64,7 @@ def read_capture(
             f"{downscale} and {max_size_px}",
             "Leave them out.",
         )
+    scene_kind = chosen_kind(kind)
     listing = check_capture(path, skip_missing=skip_missing)
     train, test = decoded(listing, max_size_px=max_size_px, downscale=downscale)
-    return Capture(train, test, background, notes=listing.notes)
+    return normalised(Capture(train, test, background, notes=listing.notes, kind=scene_kind))

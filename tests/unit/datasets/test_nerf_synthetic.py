@@ -3,6 +3,7 @@ import pytest
 
 from core.datasets import check_capture, read_capture
 from core.errors import ImageMissing, ImageSizeMismatch, PosesInvalid, TooFewImages
+from core.normalisation import pose_in_user_frame
 from tests.unit.datasets.captures import pose, synthetic, write_json, write_photo
 
 
@@ -14,7 +15,7 @@ def test_split_and_cameras_are_as_stated(tmp_path):
     assert camera.size_px == (8, 6)
     assert camera.centre_px == (4.0, 3.0)
     assert camera.focal_px == pytest.approx((4 / np.tan(0.345),) * 2)
-    np.testing.assert_array_equal(camera.world_from_camera, pose(1))
+    np.testing.assert_allclose(pose_in_user_frame(capture.user_from_object, camera), pose(1), atol=1e-12)
     assert capture.train[0].image_u8[0, 0].tolist() == [200, 120, 40, 180]
 
 

@@ -10,6 +10,7 @@ from core.errors import (
     PosesInvalid,
     TooFewImages,
 )
+from core.normalisation import pose_in_user_frame
 from tests.unit.datasets.captures import change_frame, nerfstudio, pose, write_photo
 
 
@@ -17,7 +18,7 @@ def test_shared_intrinsics_are_read(tmp_path):
     capture = read_capture(nerfstudio(tmp_path))
     camera = capture.train[0].camera
     assert (camera.focal_px, camera.centre_px, camera.size_px) == ((10.0, 11.0), (4.25, 2.75), (8, 6))
-    np.testing.assert_array_equal(camera.world_from_camera, pose(1))
+    np.testing.assert_allclose(pose_in_user_frame(capture.user_from_object, camera), pose(1), atol=1e-12)
 
 
 def test_every_eighth_photo_by_name_is_held_out(tmp_path):

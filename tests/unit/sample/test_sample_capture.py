@@ -8,6 +8,7 @@ import pytest
 
 from core.datasets import read_capture
 from core.errors import OptionInvalid
+from core.normalisation import pose_in_user_frame
 from core.progress import Progress
 from core.sample import sample_depth, write_sample_capture
 from core.sample.cameras import hemisphere_cameras, orbit_cameras
@@ -60,7 +61,8 @@ def test_capture_is_readable(written):
     assert (len(capture.train), len(capture.test)) == (3, 2)
     assert capture.has_alpha
     for view, camera in zip(capture.train, hemisphere_cameras(3, 24, 0), strict=True):
-        np.testing.assert_allclose(view.camera.world_from_camera, camera.world_from_camera)
+        theirs = pose_in_user_frame(capture.user_from_object, view.camera)
+        np.testing.assert_allclose(theirs, camera.world_from_camera, atol=1e-12)
         assert view.camera.focal_px == pytest.approx(camera.focal_px)
 
 

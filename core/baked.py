@@ -1,6 +1,6 @@
 """The baked scene: the one thing that exporters read and readers return. NumPy only."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from core.conventions import (
 from core.errors import SceneInvalid
 
 LAYER_SHAPES = ((NETWORK_HIDDEN, NETWORK_INPUTS), (NETWORK_HIDDEN, NETWORK_HIDDEN), (NETWORK_OUTPUTS, NETWORK_HIDDEN))
+
+SIMILARITY_TOLERANCE = 1e-6
+SMALLEST_SCALE = 1e-18  # nanometres in light years; squares of it and of its inverse still fit float32
 
 
 @dataclass(frozen=True)
@@ -96,8 +99,11 @@ class BakedScene:
         pages: at least one.
         network: the shader network.
         background: sRGB in [0, 1] that the photos were shown over.
-        asset_from_object: [4, 4] float64, rigid with uniform scale: the object frame in glTF's (+y up).
+        asset_from_object: [4, 4] float64 similarity: the object frame in the asset's, glTF's (+y up).
         cameras: views worth offering to a person, in the object frame.
+        user_from_object: [4, 4] float64 similarity: the object frame in that of the capture's files.
+        start_camera: index among `cameras` of the one to start from; None leaves it to the viewer. Scenes that surround
+            their cameras have one: from outside there is nothing to see.
     """
 
     pages: tuple[Page, ...]
@@ -105,11 +111,16 @@ class BakedScene:
     background: tuple[float, float, float]
     asset_from_object: np.ndarray
     cameras: tuple[Camera, ...] = ()
+    user_from_object: np.ndarray = field(default_factory=lambda: np.eye(4))
+    start_camera: int | None = None
 
     def __post_init__(self) -> None:
         _require(len(self.pages) > 0, "scene", "must have at least one page", "none")
-        matrix_ok = np.shape(self.asset_from_object) == (4, 4) and bool(np.isfinite(self.asset_from_object).all())
-        _require(matrix_ok, "asset_from_object", "must be a finite 4x4 matrix", str(np.shape(self.asset_from_object)))
+        _check_similarity("asset_from_object", self.asset_from_object)
+        _check_similarity("user_from_object", self.user_from_object)
+        start = self.start_camera
+        among = start is None or (type(start) is int and 0 <= start < len(self.cameras))
+        _require(among, "start_camera", f"must be one of the {len(self.cameras)} cameras", str(start)[:20])
         background_ok = len(self.background) == 3 and all(0 <= c <= 1 for c in self.background)
         _require(background_ok, "background", "must be three numbers in [0, 1]", str(self.background))
 
@@ -126,6 +137,24 @@ class BakedScene:
         """(lowest, highest) corner [3] float64 of all vertices, object frame."""
         points = np.concatenate([page.positions for page in self.pages]).astype(np.float64)
         return points.min(0), points.max(0)
+
+
+def similarity_scale(matrix: np.ndarray) -> float:
+    """The uniform scale, > 0, of a similarity [4, 4]; exact where its rotation permutes axes."""
+    with np.errstate(over="ignore"):
+        return float(np.median(np.linalg.norm(np.asarray(matrix, np.float64)[:3, :3], axis=0)))
+
+
+def _check_similarity(subject: str, matrix: np.ndarray) -> None:
+    ok = np.shape(matrix) == (4, 4) and bool(np.isfinite(matrix).all())
+    _require(ok, subject, "must be a finite 4x4 matrix", str(np.shape(matrix)))
+    scale = similarity_scale(matrix)
+    ok = SMALLEST_SCALE <= scale <= 1 / SMALLEST_SCALE and np.array_equal(np.asarray(matrix)[3], [0, 0, 0, 1])
+    if ok:
+        block = np.asarray(matrix, np.float64)[:3, :3] / scale
+        ok = np.allclose(block.T @ block, np.eye(3), atol=SIMILARITY_TOLERANCE) and bool(np.linalg.det(block) > 0)
+    rule = f"must be a rotation, a translation and one scale, {SMALLEST_SCALE:g} to {1 / SMALLEST_SCALE:g}"
+    _require(ok, subject, rule, str(np.asarray(matrix).tolist()))
 
 
 def _sigmoid(x: np.ndarray) -> np.ndarray:

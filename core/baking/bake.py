@@ -1,6 +1,7 @@
 """Stage 3 (paper 3.3): from trained texels to a BakedScene that holds only what is seen."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -9,6 +10,7 @@ from torch import Tensor
 from core.baked import BakedScene
 from core.baking.pages import pack_pages, patches_of
 from core.baking.seen import look_from
+from core.baking.start import start_camera
 from core.camera import Camera
 from core.capture import Capture
 from core.conventions import bytes_from_features
@@ -47,9 +49,8 @@ def bake(stage: TexelStage, capture: Capture, frame: Frame, report: Callable[[fl
     colors = _filled(colors, visible[keep], features_u8, mean_colors(stage, features_u8))
     corners = frame.to_object(_corners(stage)[keep])
     pages = pack_pages(corners, features_u8, colors)
-    return BakedScene(
-        pages, everything.network, capture.background, capture.asset_from_object, _shipped_cameras(capture)
-    )
+    shipped = _shipped_cameras(capture)
+    return replace(everything, pages=pages, cameras=shipped, start_camera=start_camera(shipped, capture.kind.name))
 
 
 def quick_bake(stage: TexelStage, capture: Capture, frame: Frame) -> BakedScene:
@@ -60,7 +61,13 @@ def quick_bake(stage: TexelStage, capture: Capture, frame: Frame) -> BakedScene:
     features = stage.parameters.features.cpu().numpy().reshape(*shape, -1)
     features_u8 = bytes_from_features(features, opaque)
     pages = pack_pages(frame.to_object(_corners(stage)), features_u8, np.zeros((*shape, 3), np.uint8))
-    return BakedScene(pages, baked_network(stage.network), capture.background, capture.asset_from_object)
+    return BakedScene(
+        pages,
+        baked_network(stage.network),
+        capture.background,
+        capture.asset_from_object,
+        user_from_object=capture.user_from_object,
+    )
 
 
 def mean_colors(stage: TexelStage, features_u8: np.ndarray) -> np.ndarray:

@@ -15,6 +15,8 @@ from exporters.gltf import extension
 from exporters.gltf.document import Document
 from exporters.gltf.invalid import invalid
 from exporters.gltf.limits import check_size
+from exporters.gltf.numbers import matrix_from_column_major, numbers
+from exporters.gltf.placement import node_matrix
 from exporters.gltf.png import decode_pngs, png_size
 
 _FLOAT = (5126,)
@@ -23,7 +25,7 @@ _WHITE = [1.0, 1.0, 1.0]
 
 
 def read_glb(data: bytes) -> BakedScene:
-    """The scene in a .glb written by `write_glb`, bit for bit.
+    """The scene in a .glb written by `write_glb`, bit for bit (`asset_from_object`: as `placement.trs` says).
 
     Raises:
         AssetInvalid: damaged, or not a file of this kind. Nothing else, whatever the bytes.
@@ -37,6 +39,8 @@ def read_glb(data: bytes) -> BakedScene:
             background=_background(root),
             asset_from_object=_asset_from_object(document),
             cameras=_cameras(document, root),
+            user_from_object=_user_from_object(root),
+            start_camera=root.get("startView"),
         )
 
 
@@ -79,17 +83,21 @@ def _network(root: dict[str, Any]) -> dict[str, Any]:
 
 
 def _background(root: dict[str, Any]) -> tuple[float, float, float]:
-    red, green, blue = extension.numbers(root.get("background", _WHITE), "background").tolist()
+    red, green, blue = numbers(root.get("background", _WHITE), "background").tolist()
     return red, green, blue
 
 
 def _asset_from_object(document: Document) -> np.ndarray:
     """The transform of the scene's root node, the object."""
     (root,) = document.item("scenes", document.json.get("scene", 0))["nodes"]
-    node = document.item("nodes", root)
-    if "matrix" not in node:
+    return node_matrix(document.item("nodes", root), "object node")
+
+
+def _user_from_object(root: dict[str, Any]) -> np.ndarray:
+    """Files from before the property was there are in the user's frame."""
+    if "userFromObject" not in root:
         return np.eye(4)
-    return extension.matrix_from_column_major(node["matrix"], "object node's matrix")
+    return matrix_from_column_major(root["userFromObject"], "userFromObject")
 
 
 def _cameras(document: Document, root: dict[str, Any]) -> tuple[Camera, ...]:

@@ -5,43 +5,38 @@ from typing import Any
 import numpy as np
 import pygltflib as gltf
 
-from core.baked import BakedScene, Page
+from core.baked import BakedScene, Page, similarity_scale
 from core.conventions import is_opaque
 from core.errors import SceneInvalid
 from exporters.gltf import extension
 from exporters.gltf.blob import Blob
-from exporters.gltf.cameras import camera_json, nearest_rigid
+from exporters.gltf.cameras import camera_json
 from exporters.gltf.limits import check_size
+from exporters.gltf.numbers import column_major
+from exporters.gltf.placement import nearest_rotation, trs
 from exporters.gltf.png import encode_pngs
 
 FILE_NAME = "scene.glb"
 IMAGES_PER_PAGE = 3  # features 0-3, features 4-7, fallback colour
 ALPHA_CUTOFF = 0.5
-SIMILARITY_TOLERANCE = 1e-6
 _PRIMITIVE_RESTART_U16 = 65535  # an index that glTF forbids
 
 
 def write_glb(scene: BakedScene) -> dict[str, bytes]:
-    """`{"scene.glb": ...}`: the whole scene; `read_glb` returns it bit for bit.
+    """`{"scene.glb": ...}`: the whole scene; `read_glb` returns it bit for bit (`asset_from_object`: as `trs` says).
 
     Viewers that do not know the extension show the pages' mean colours, unlit.
 
     Raises:
-        SceneInvalid: asset_from_object is not a similarity, or the pages exceed what a reader accepts.
+        SceneInvalid: the pages exceed what a reader accepts.
     """
-    _check_similarity(scene.asset_from_object)
     check_size([page.features_u8.shape[:2] for page in scene.pages], SceneInvalid)
     blob = Blob()
     document = _empty_document()
     _add_pages(document, blob, scene)
     views = _add_cameras(document, scene)
     _add_object_node(document, scene)
-    root = {
-        "networks": [extension.network_json(scene.network)],
-        "background": [float(c) for c in scene.background],
-        "views": views,
-    }
-    document.extensions = {extension.NAME: root if views else {k: v for k, v in root.items() if k != "views"}}
+    document.extensions = {extension.NAME: _root(scene, views)}
     document.bufferViews = blob.views
     document.buffers = [gltf.Buffer(byteLength=len(blob.data))]
     document.set_binary_blob(bytes(blob.data))
@@ -123,34 +118,40 @@ def _accessor(view: int, component_type: int, kind: str, count: int, **corners: 
     return gltf.Accessor(bufferView=view, componentType=component_type, type=kind, count=count, **corners)
 
 
+def _root(scene: BakedScene, views: list[dict[str, Any]]) -> dict[str, Any]:
+    """The extension of the glTF root; what has its default is left out."""
+    root: dict[str, Any] = {
+        "networks": [extension.network_json(scene.network)],
+        "background": [float(c) for c in scene.background],
+    }
+    if views:
+        root["views"] = views
+    if scene.start_camera is not None:
+        root["startView"] = int(scene.start_camera)
+    if not np.array_equal(scene.user_from_object, np.eye(4)):
+        root["userFromObject"] = column_major(scene.user_from_object)
+    return root
+
+
 def _add_cameras(document: gltf.GLTF2, scene: BakedScene) -> list[dict[str, Any]]:
-    """Adds a camera and its node per view; returns the extension's exact views."""
+    """Adds a camera and its node per view; returns the extension's exact views.
+
+    The nodes take the object's scale back: clients do not agree on whether the scale above a camera counts.
+    """
     lowest, highest = scene.bounds()
+    scale = similarity_scale(scene.asset_from_object)
     views = []
     for camera in scene.cameras:
-        document.cameras.append(camera_json(camera, float(np.linalg.norm(highest - lowest))))
-        matrix = _node_matrix(nearest_rigid(camera.world_from_camera))
-        document.nodes.append(gltf.Node(name=camera.name, camera=len(document.cameras) - 1, matrix=matrix))
+        document.cameras.append(camera_json(camera, scale * float(np.linalg.norm(highest - lowest))))
+        place = np.eye(4)
+        place[:3, :3] = nearest_rotation(camera.world_from_camera[:3, :3]) / scale
+        place[:3, 3] = camera.position
+        document.nodes.append(gltf.Node(name=camera.name, camera=len(document.cameras) - 1, **trs(place)))
         views.append(extension.view_json(camera, len(document.nodes) - 1))
     return views
 
 
 def _add_object_node(document: gltf.GLTF2, scene: BakedScene) -> None:
     """Everything else hangs below node 0, so that cameras and meshes share the object frame."""
-    document.nodes[0].children = list(range(1, len(document.nodes)))
-    document.nodes[0].matrix = _node_matrix(scene.asset_from_object)
-
-
-def _node_matrix(matrix: np.ndarray) -> list[float] | None:
-    """A node's matrix; none for the identity, which is glTF's default."""
-    return None if np.array_equal(matrix, np.eye(4)) else extension.column_major(matrix)
-
-
-def _check_similarity(matrix: np.ndarray) -> None:
-    block = matrix[:3, :3]
-    scale = np.cbrt(np.linalg.det(block))
-    similar = scale > 0 and np.allclose(block.T @ block / scale**2, np.eye(3), atol=SIMILARITY_TOLERANCE)
-    if not similar or not np.array_equal(matrix[3], [0, 0, 0, 1]):
-        raise SceneInvalid(
-            "asset_from_object", "must be a rotation, a translation and one positive scale", str(matrix.tolist())
-        )
+    place = trs(scene.asset_from_object)
+    document.nodes[0] = gltf.Node(name="object", children=list(range(1, len(document.nodes))), **place)

@@ -2,9 +2,11 @@
 
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from jsonschema import Draft202012Validator, ValidationError
 from referencing import Registry, Resource
@@ -43,7 +45,7 @@ def check(name: str, instance: Any) -> None:
 
 @pytest.fixture
 def document(scene: BakedScene) -> dict[str, Any]:
-    glb = write_glb(scene)["scene.glb"]
+    glb = write_glb(replace(scene, user_from_object=np.diag([2.0, 2.0, 2.0, 1.0]), start_camera=1))["scene.glb"]
     (length,) = struct.unpack_from("<I", glb, 12)
     return json.loads(glb[20 : 20 + length])
 
@@ -55,6 +57,11 @@ def test_schema_is_itself_valid(name: str) -> None:
 
 def test_root_extension_follows_its_schema(document: dict[str, Any]) -> None:
     check(f"glTF.{NAME}.schema.json", document["extensions"][NAME])
+
+
+def test_every_optional_property_is_written_where_it_says_something(document: dict[str, Any]) -> None:
+    properties = own_schemas()[f"glTF.{NAME}.schema.json"]["properties"]
+    assert set(document["extensions"][NAME]) == set(properties) - {"extensions", "extras"}
 
 
 def test_every_primitive_follows_its_schema(document: dict[str, Any]) -> None:

@@ -46,13 +46,21 @@ def test_validator_finds_nothing_in_a_scene_with_pages_and_cameras(scene: BakedS
     assert report["info"]["maxUVs"] == 1
 
 
-@pytest.mark.parametrize(
-    "transform",
-    [np.eye(4), np.diag([2.5, 2.5, 2.5, 1.0])],
-    ids=["identity", "scaled"],
-)
-def test_validator_finds_nothing_with_other_object_transforms(transform: np.ndarray, tmp_path: Path) -> None:
-    scene = replace(random_scene(np.random.default_rng(1)), asset_from_object=transform, cameras=())
+@pytest.mark.parametrize("scale", [1.0, 2.5, 1e-6, 1e6])
+@pytest.mark.parametrize("translation", [0.0, 1e6], ids=["here", "far away"])
+def test_validator_finds_nothing_wherever_the_object_is(scale: float, translation: float, tmp_path: Path) -> None:
+    q, _ = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))
+    placed = np.eye(4)
+    placed[:3, :3] = scale * np.sign(np.linalg.det(q)) * q
+    placed[:3, 3] = scale * translation
+    scene = replace(
+        random_scene(np.random.default_rng(1)), asset_from_object=placed, user_from_object=placed, start_camera=0
+    )
+    assert_clean(validated(write_glb(scene)["scene.glb"], tmp_path))
+
+
+def test_validator_finds_nothing_in_an_object_that_is_not_placed(tmp_path: Path) -> None:
+    scene = replace(random_scene(np.random.default_rng(1)), asset_from_object=np.eye(4), cameras=())
     assert_clean(validated(write_glb(scene)["scene.glb"], tmp_path))
 
 

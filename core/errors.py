@@ -5,6 +5,7 @@ PolyfieldError
 |  |- CaptureNotFound        capture-not-found
 |  |- NoImages               no-images
 |  |- PosesMissing           poses-missing
+|  |- PosesNotFound          poses-not-found         the photos' cameras could not be estimated from the photos
 |  |- PosesInvalid           poses-invalid           not JSON, fields missing, no intrinsics
 |  |- PoseNotFinite          pose-not-finite
 |  |- PoseNotRigid           pose-not-rigid
@@ -69,6 +70,10 @@ class NoImages(InputError):
 
 class PosesMissing(InputError):
     code = "poses-missing"
+
+
+class PosesNotFound(InputError):
+    code = "poses-not-found"
 
 
 class PosesInvalid(InputError):

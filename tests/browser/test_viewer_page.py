@@ -1,7 +1,5 @@
 """The viewer's page as a person meets it."""
 
-import base64
-import io
 import json
 import struct
 
@@ -14,7 +12,7 @@ from core.baked import BakedScene
 from exporters.gltf import write_glb
 from tests.browser.chromium import NO_WEBGL, launched
 from tests.browser.site import Site
-from tests.browser.viewer import ViewerPage
+from tests.browser.viewer import ViewerPage, canvas
 
 PHONE = {"width": 390, "height": 844}
 
@@ -33,7 +31,7 @@ def test_all_three_modes_draw_the_object(viewer: ViewerPage) -> None:
     for mode in ("Deferred", "Forward", "Fallback"):
         viewer.page.locator("#modes label").filter(has_text=mode).click()
         viewer.page.evaluate("polyfield.stage.rendererOf(polyfield.stage.mode).load?.()")
-        picture = _canvas(viewer.page)
+        picture = canvas(viewer.page)
         assert (picture[..., :3] < 200).all(-1).mean() > 0.1, mode
 
 
@@ -63,21 +61,19 @@ def test_view_picker_stands_where_the_photo_was_taken(viewer: ViewerPage, scene:
     page = viewer.page
     page.get_by_role("button", name="Next view").click()
     expect(page.locator("#view option:checked")).to_have_text("side")
-    x, y, z = scene.cameras[1].position
-    position = page.evaluate("polyfield.stage.rig.camera.position.toArray()")
-    np.testing.assert_allclose(position, [x, z, -y], atol=1e-5)  # the asset has +y up
+    np.testing.assert_allclose(viewer.position(), scene.cameras[1].position, atol=1e-9)  # double precision
 
 
 def test_transparent_background_leaves_the_canvas_transparent(viewer: ViewerPage) -> None:
     viewer.page.locator("#background").select_option("none")
-    alpha = _canvas(viewer.page)[..., 3]
+    alpha = canvas(viewer.page)[..., 3]
     assert (alpha == 0).mean() > 0.2
     assert (alpha == 255).mean() > 0.2
 
 
 def test_photos_background_arrives_byte_for_byte(viewer: ViewerPage) -> None:
     viewer.page.evaluate("polyfield.stage.setBackground([10 / 255, 100 / 255, 200 / 255])")
-    assert tuple(_canvas(viewer.page)[0, 0]) == (10, 100, 200, 255)
+    assert tuple(canvas(viewer.page)[0, 0]) == (10, 100, 200, 255)
 
 
 def test_save_picture_downloads_a_png(viewer: ViewerPage) -> None:
@@ -94,7 +90,7 @@ def test_file_without_the_extension_is_shown_plainly_with_a_note(page: Page, sit
     expect(page.locator("#note")).to_contain_text("no neural material")
     expect(page.get_by_role("radio", name="Fallback")).to_be_checked()
     expect(page.get_by_role("radio", name="Deferred")).to_be_disabled()
-    assert (_canvas(page)[..., :3] < 200).all(-1).mean() > 0.1
+    assert (canvas(page)[..., :3] < 200).all(-1).mean() > 0.1
 
 
 def test_picked_file_is_shown(page: Page, site: Site, scene: BakedScene) -> None:
@@ -132,13 +128,6 @@ def test_panel_leaves_a_phone_room_for_the_picture(viewer: ViewerPage) -> None:
     assert canvas["width"] == PHONE["width"]
     assert canvas["height"] >= 0.4 * PHONE["height"]
     assert panel["y"] >= canvas["y"] + canvas["height"] - 1
-
-
-def _canvas(page: Page) -> np.ndarray:
-    """[h, w, 4] uint8: what the canvas shows now, straight alpha."""
-    page.evaluate("polyfield.stage.drawNow(); window.picture = document.getElementById('canvas').toDataURL()")
-    png = base64.b64decode(page.evaluate("picture").split(",")[1])
-    return np.asarray(Image.open(io.BytesIO(png)).convert("RGBA"))
 
 
 def _without_extension(glb: bytes) -> bytes:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from playwright.sync_api import Page
 
 from core.baked import BakedScene
@@ -35,8 +36,11 @@ def test_viewer_matches_the_reference_from_every_camera(viewer: ViewerPage, scen
             assert_equal_but_for_edges(viewer, scene, view, mode)
 
 
-def test_turned_moved_and_scaled_asset_keeps_its_shading(page: Page, site: Site, scene: BakedScene) -> None:
-    placed = replace(scene, asset_from_object=_placement())
+@pytest.mark.parametrize(("scale", "distance"), [(2.5, 2.0), (1e-6, 1e6), (1e6, 1e6)])
+def test_turned_moved_and_scaled_asset_keeps_its_shading(
+    page: Page, site: Site, scene: BakedScene, scale: float, distance: float
+) -> None:
+    placed = replace(scene, asset_from_object=placement(scale, distance))
     viewer = open_scene(page, site, placed)
     for mode in MODES:
         assert_equal_but_for_edges(viewer, placed, 2, mode)
@@ -63,11 +67,11 @@ def test_another_size_scales_the_view(viewer: ViewerPage, scene: BakedScene) -> 
     assert comparison.interior_psnr >= INTERIOR_DB, str(comparison)
 
 
-def _placement() -> np.ndarray:
-    """An asset_from_object that turns, moves and scales."""
+def placement(scale: float, distance: float) -> np.ndarray:
+    """An asset_from_object that turns, scales, and moves by `distance` times its scale."""
     cos, sin = np.cos(0.8), np.sin(0.8)
     rotation = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
     matrix = np.eye(4)
-    matrix[:3, :3] = 2.5 * rotation
-    matrix[:3, 3] = (4.0, -1.0, 2.0)
+    matrix[:3, :3] = scale * rotation
+    matrix[:3, 3] = scale * distance * np.array([0.8, -0.2, 0.4])
     return matrix

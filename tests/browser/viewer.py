@@ -1,10 +1,12 @@
 """Driving the viewer's page: pixels out of `window.polyfield`."""
 
 import base64
+import io
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from PIL import Image
 from playwright.sync_api import Page
 
 from core.camera import Camera
@@ -40,6 +42,11 @@ await polyfield.renderToPixels(view, mode, width, height)); }}"
         data = self.page.evaluate(script, [which, mode, width, height])
         return _bytes(data).reshape(height, width, 4) / 255.0
 
+    def position(self) -> np.ndarray:
+        """[3]: where the person's camera is, in the object frame."""
+        script = "polyfield.stage.gltf.neural.parts[0].mesh.worldToLocal(polyfield.stage.rig.camera.position.clone())"
+        return np.array(self.page.evaluate(f"{script}.toArray()"))
+
     def feature_texture(self, page: int, half: int) -> np.ndarray:
         """[height, width, 4] uint8 as the graphics processor has it: features 0 to 3 (half 0) or 4 to 7 (half 1)."""
         script = f"([page, half]) => {{ {TO_BASE64} const t = polyfield.readFeatureTexture(page, half); \
@@ -62,6 +69,13 @@ def open_viewer(page: Page, address: str) -> ViewerPage:
     if errors:
         raise RuntimeError("; ".join(errors))
     return ViewerPage(page)
+
+
+def canvas(page: Page) -> np.ndarray:
+    """[h, w, 4] uint8: what the canvas shows now, straight alpha."""
+    page.evaluate("polyfield.stage.drawNow(); window.picture = document.getElementById('canvas').toDataURL()")
+    png = base64.b64decode(page.evaluate("picture").split(",")[1])
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGBA"))
 
 
 def collect_errors(page: Page) -> list[str]:

@@ -58,10 +58,23 @@ def test_loose_intersecting_quads_match_the_reference(context: moderngl.Context,
     assert_equal_but_for_edges(compared(renderer, scene.cameras[0], mode))
 
 
+@pytest.mark.parametrize(("scale", "distance"), [(3.7, 1.5), (1e-6, 1e6), (1e6, 1e6)])
 @pytest.mark.parametrize("mode", MODES)
-def test_turned_moved_and_scaled_object_keeps_its_shading(renderer: GlRenderer, mode: Mode) -> None:
+def test_turned_moved_and_scaled_object_keeps_its_shading(
+    renderer: GlRenderer, mode: Mode, scale: float, distance: float
+) -> None:
     camera = renderer.scene.cameras[2]
-    assert_equal_but_for_edges(compared(renderer, camera, mode, _placement(scale=3.7)))
+    assert_equal_but_for_edges(compared(renderer, camera, mode, _placement(scale, distance)))
+
+
+def test_placed_scene_written_and_read_looks_the_same(context: moderngl.Context, scene: BakedScene) -> None:
+    placed = replace(scene, asset_from_object=_placement(1e6, 1e6), user_from_object=_placement(1e-6, 1e6))
+    here, there = (GlRenderer(context, write_glb(each)["scene.glb"]) for each in (scene, placed))
+    camera = scene.cameras[0]
+    far_away = _moved(camera, there.scene.asset_from_object)
+    actual = there.render(far_away, "deferred", there.scene.asset_from_object)
+    comparison = compare(actual, here.render(camera, "deferred"), pixels_with_edges(scene, camera))
+    assert_equal_but_for_edges(comparison)
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -105,14 +118,14 @@ def test_saturated_network_shows_only_valid_colours(
     assert differs.mean() < 0.01
 
 
-def _placement(scale: float) -> np.ndarray:
-    """A world_from_object that turns about a skew axis, moves and scales."""
+def _placement(scale: float, distance: float) -> np.ndarray:
+    """A world_from_object that turns about a skew axis, scales, and moves by `distance` times its scale."""
     axis = np.array([1.0, -2.0, 0.5]) / np.sqrt(5.25)
     cross = np.cross(np.eye(3), -axis)
     rotation = np.eye(3) + np.sin(2.1) * cross + (1 - np.cos(2.1)) * cross @ cross  # Rodrigues
     matrix = np.eye(4)
     matrix[:3, :3] = scale * rotation
-    matrix[:3, 3] = (5.0, -3.0, 0.7)
+    matrix[:3, 3] = scale * distance * np.array([0.8, -0.5, 0.1])
     return matrix
 
 

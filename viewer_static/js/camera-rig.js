@@ -1,19 +1,20 @@
-// The camera a person steers: orbit, pan and zoom by mouse, touch and keyboard.
+// The camera a person steers: orbit, pan and zoom by mouse, touch and keyboard. All in the viewing frame.
 
-import { Box3, MathUtils, PerspectiveCamera, Quaternion, Sphere, Vector3 } from "three";
+import { MathUtils, PerspectiveCamera, Quaternion, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { verticalFov, worldFromCamera } from "./capture-view.js";
 
 const DEFAULT_FOV = 40; // degrees
 const MARGIN = 1.02; // of the bounding sphere, so that nothing is clipped by rounding
 const TIGHTER = 0.85; // the sphere about the bounding box is wider than what is in it
-const NEAREST = 1e-3; // of the sphere's radius
+const NEAREST = 1e-3; // of the distance that is looked at
+const NEAREST_TARGET = 0.1; // the viewing frame's unit is the distance of interest
 
 export class CameraRig {
   #camera = new PerspectiveCamera(DEFAULT_FOV);
   #controls;
-  #bounds = new Sphere(new Vector3(), 1);
-  #frame = { fov: DEFAULT_FOV, aspect: 1 };
+  #scene = { centre: new Vector3(), radius: 1, surrounds: false };
+  #frame = { fov: DEFAULT_FOV, aspect: 1, filled: false };
   #start = null;
 
   /**
@@ -33,44 +34,54 @@ export class CameraRig {
     return this.#camera;
   }
 
-  /** Nearest and farthest depth of the scene for any camera at `position`, in world units. */
-  depthRange(position = this.#camera.position) {
-    const { center, radius } = this.#bounds;
-    const distance = position.distanceTo(center);
+  /**
+   * Nearest and farthest depth of the scene for a camera at `position`.
+   *
+   * @param {Vector3} position
+   * @param {number} focus distance of what is looked at
+   */
+  depthRange(position, focus = 1) {
+    const { centre, radius } = this.#scene;
+    const distance = position.distanceTo(centre);
+    const nearest = NEAREST * Math.min(focus, radius);
     return {
-      near: Math.max(distance - MARGIN * radius, NEAREST * radius),
-      far: Math.max(distance + MARGIN * radius, 2 * NEAREST * radius),
+      near: Math.max(distance - MARGIN * radius, nearest),
+      far: Math.max(distance + MARGIN * radius, 2 * nearest),
     };
   }
 
-  /** Sets the scene that is looked at. */
+  /** Sets the scene that is looked at, as inViewingFrame describes it. */
   setScene(scene) {
-    this.#bounds = new Box3().setFromObject(scene, true).getBoundingSphere(new Sphere());
-    if (!(this.#bounds.radius > 0)) this.#bounds.radius = 1;
-    this.#controls.minDistance = 0.02 * this.#bounds.radius;
-    this.#controls.maxDistance = 40 * this.#bounds.radius;
+    this.#scene = scene;
+    this.#controls.minDistance = 0.02;
+    // There is nothing to see of surroundings from outside.
+    this.#controls.maxDistance = scene.surrounds ? Math.max(scene.radius, 4) : 40 * scene.radius;
   }
 
   /** Looks at the whole scene from the front, slightly from above. */
   frameScene() {
-    const { center, radius } = this.#bounds;
-    this.#frame = { fov: DEFAULT_FOV, aspect: 1 };
+    const { centre, radius } = this.#scene;
+    this.#frame = { fov: DEFAULT_FOV, aspect: 1, filled: false };
     const distance = (TIGHTER * radius) / Math.sin(MathUtils.degToRad(DEFAULT_FOV / 2));
-    this.#camera.position.copy(center).addScaledVector(new Vector3(0.35, 0.4, 0.85).normalize(), distance);
-    this.#controls.target.copy(center);
+    this.#controls.maxDistance = Math.max(this.#controls.maxDistance, distance);
+    this.#camera.position.copy(centre).addScaledVector(new Vector3(0.35, 0.4, 0.85).normalize(), distance);
+    this.#controls.target.copy(centre);
     this.#settle();
   }
 
-  /** Stands where a photo was taken; the whole photo is in sight. `object` is a mesh of the asset. */
+  /**
+   * Stands where a photo was taken. Of an object, the whole photo is in sight; of surroundings, nothing beyond it, where
+   * there may be nothing. `object` is a mesh of the asset.
+   */
   standAt(view, object) {
     const matrix = worldFromCamera(view, object);
-    this.#frame = { fov: verticalFov(view), aspect: view.imageSize[0] / view.imageSize[1] };
+    const { surrounds } = this.#scene;
+    this.#frame = { fov: verticalFov(view), aspect: view.imageSize[0] / view.imageSize[1], filled: surrounds };
     const rotation = new Quaternion();
     matrix.decompose(this.#camera.position, rotation, new Vector3());
     const forward = new Vector3(0, 0, -1).applyQuaternion(rotation);
-    // Orbit about the point of the line of sight that is nearest to the scene's centre.
-    const along = forward.dot(this.#bounds.center.clone().sub(this.#camera.position));
-    const depth = Math.max(along, 0.1 * this.#bounds.radius);
+    // Orbit about the point of the line of sight that is nearest to the point of interest, the origin.
+    const depth = Math.max(-forward.dot(this.#camera.position), NEAREST_TARGET);
     this.#controls.target.copy(this.#camera.position).addScaledVector(forward, depth);
     this.#settle();
   }
@@ -83,17 +94,20 @@ export class CameraRig {
     this.#controls.update();
   }
 
-  /** Fits the framed picture into a canvas of this aspect ratio (width / height). */
+  /** Fits the framed picture into a canvas of this aspect ratio (width / height), or fills the canvas with it. */
   setAspect(aspect) {
     const half = Math.tan(MathUtils.degToRad(this.#frame.fov / 2));
+    const ratio = this.#frame.aspect / aspect;
+    const share = this.#frame.filled ? Math.min(1, ratio) : Math.max(1, ratio);
     this.#camera.aspect = aspect;
-    this.#camera.fov = MathUtils.radToDeg(2 * Math.atan(half * Math.max(1, this.#frame.aspect / aspect)));
+    this.#camera.fov = MathUtils.radToDeg(2 * Math.atan(half * share));
   }
 
   /** Moves on by one frame. */
   update() {
     this.#controls.update();
-    Object.assign(this.#camera, this.depthRange());
+    const { position } = this.#camera;
+    Object.assign(this.#camera, this.depthRange(position, position.distanceTo(this.#controls.target)));
     this.#camera.updateProjectionMatrix();
     this.#camera.updateMatrixWorld(true);
   }

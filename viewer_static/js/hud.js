@@ -82,7 +82,7 @@ export class Hud {
     const views = this.#stage.gltf.neural?.views ?? [];
     const options = [new Option("overview", WHOLE), ...views.map((view, i) => new Option(view.name, String(i)))];
     byId("view").replaceChildren(...options);
-    byId("view").value = views.length > 0 ? "0" : WHOLE;
+    byId("view").value = views.length > 0 ? String(this.#stage.gltf.neural.startView ?? 0) : WHOLE;
     for (const id of ["view", "previous-view", "next-view"]) byId(id).disabled = views.length === 0;
     this.#goToView();
   }

@@ -13,7 +13,7 @@ const DIALECT = "essl300";
  *
  * @param {ArrayBuffer} bytes
  * @returns {Promise<object>} GLTFLoader's result; `gltf.neural` is null where the file lacks the extension, otherwise
- *   `{parts, network, background, views}`, see NeuralExtension.
+ *   `{parts, shaders, background, views, startView}`, see NeuralExtension.
  */
 export async function loadGlb(bytes) {
   const loader = new GLTFLoader();
@@ -27,6 +27,7 @@ export async function loadGlb(bytes) {
  *   shaders     the three GLSL programs of the asset's network
  *   background  sRGB [r, g, b] in [0, 1]
  *   views       the capture's cameras as the extension gives them, each with a `name`
+ *   startView   index among them of the one to start from, null where the asset does not say
  */
 class NeuralExtension {
   name = EXTENSION;
@@ -54,7 +55,9 @@ class NeuralExtension {
       return this.#readPart(mesh, primitive, shaders);
     });
     const views = (root.views ?? []).map((view, i) => ({ ...view, name: nameOfView(json, view) || `View ${i + 1}` }));
-    gltf.neural = { parts: await Promise.all(parts.filter(Boolean)), shaders, background: root.background ?? [1, 1, 1], views };
+    const background = root.background ?? [1, 1, 1];
+    const startView = views[root.startView] ? root.startView : null;
+    gltf.neural = { parts: await Promise.all(parts.filter(Boolean)), shaders, background, views, startView };
     if (gltf.neural.parts.length === 0) gltf.neural = null;
   }
 

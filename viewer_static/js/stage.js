@@ -7,6 +7,7 @@ import { ForwardRenderer } from "./forward-renderer.js";
 import { FrameClock } from "./frame-clock.js";
 import { GpuTimer } from "./gpu-timer.js";
 import { PlainRenderer } from "./plain-renderer.js";
+import { inViewingFrame } from "./viewing-frame.js";
 
 const RENDERERS = { deferred: DeferredRenderer, forward: ForwardRenderer, plain: PlainRenderer };
 // Full resolution up to this many pixels; beyond it a phone gets warm and nobody sees the difference.
@@ -50,11 +51,12 @@ export class Stage {
     this.clear();
     this.#gltf = gltf;
     this.#scene = new Scene();
-    this.#scene.add(gltf.scene);
+    const framed = inViewingFrame(gltf);
+    this.#scene.add(framed.root);
     if (!gltf.neural) this.#scene.add(...plainLights());
     this.#scene.updateMatrixWorld(true);
     for (const { mesh } of gltf.neural?.parts ?? []) mesh.frustumCulled = false;
-    this.rig.setScene(gltf.scene);
+    this.rig.setScene(framed);
     this.setMode(gltf.neural ? "deferred" : "plain");
   }
 

@@ -1,0 +1,124 @@
+"""From photos to a COLMAP model, in three stages that can each be interrupted."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pycolmap
+
+from core.posing.features import write_cameras, write_features
+from core.posing.lenses import read_headers, shared_lenses
+from core.posing.mapping import mapped, write_model
+from core.posing.matching import write_matches
+from core.posing.pairs import pairs_to_match
+from core.posing.photo_set import PhotoSet, find_photo_set
+from core.posing.posing import LeftOut, Posing
+from core.posing.workspace import Workspace, identity_of
+from core.progress import Progress, ProgressCallback, ignore_progress
+
+# The stages' shares of the time, for the progress bar: 50 photos, two cores.
+STAGES = {"features": (0.0, 0.25), "matching": (0.25, 0.7), "mapping": (0.7, 1.0)}
+UNMATCHED = "without matches with other photos"
+UNPOSED = "whose matches fit no pose among the others"
+APART = "that could only be posed apart from the others"
+
+
+def pose_photos(
+    photos_folder: Path, work_folder: Path, *, progress: ProgressCallback = ignore_progress, seed: int = 0
+) -> Posing:
+    """Estimates the cameras of photos. A finished posing of the same photos is returned as it is.
+
+    Interrupted, however it was, it goes on with the features and matches that it had; the mapper starts again. With the
+    same seed on the same machine, features, pairs and matches are the same; cameras agree to a small part of a pixel,
+    because the mapper's threads add numbers in any order.
+
+    Args:
+        photos_folder: photos anywhere below; see `find_photo_set`.
+        work_folder: is made; gets what `Workspace` says. `core.datasets.read_capture` reads it afterwards.
+        progress: is told stage (features, matching, mapping) and fraction of the posing.
+
+    Returns:
+        The outcome, also where too few photos could be posed: ask `Posing.require_usable`.
+
+    Raises:
+        NoImages, TooFewImages
+    """
+    photos = find_photo_set(Path(photos_folder))
+    headers = read_headers(photos)
+    workspace = Workspace(Path(work_folder))
+    workspace.claim(identity_of(photos, seed=seed))
+    workspace.link_photos(photos, headers)
+    if (posing := workspace.outcome()) is None:
+        pycolmap.logging.minloglevel = int(pycolmap.logging.Level.ERROR)  # its log has hundreds of lines a photo
+        lenses = shared_lenses(photos, headers)
+        numbers = dict(enumerate(photos.names, start=1))
+        write_cameras(workspace.database, lenses, numbers)
+        posing = _Run(photos, numbers, workspace, seed, progress).posing()
+        workspace.finish(posing)
+    return posing
+
+
+class _Run:
+    """One posing under way."""
+
+    def __init__(
+        self, photos: PhotoSet, numbers: dict[int, str], workspace: Workspace, seed: int, progress: ProgressCallback
+    ) -> None:
+        self.photos, self.numbers, self.workspace, self.seed = photos, numbers, workspace, seed
+        self._progress = progress
+        self._seconds: dict[str, float] = {}
+
+    def posing(self) -> Posing:
+        database = self.workspace.database
+        with self._stage("features") as done:
+            faults = write_features(database, self.workspace.images, self.numbers, done)
+        with self._stage("matching") as done:
+            write_matches(database, pairs_to_match(database), self.seed, done)
+        with self._stage("mapping") as done:
+            models = mapped(database, len(self.numbers), self.seed, done)
+        return self._outcome(models, faults)
+
+    def _outcome(self, models: list[pycolmap.Reconstruction], faults: dict[int, str]) -> Posing:
+        reasons = dict.fromkeys(self.numbers, UNPOSED)
+        reasons |= dict.fromkeys(self._unmatched(), UNMATCHED)
+        reasons |= {number: APART for model in models[1:] for number in model.reg_image_ids()}
+        reasons |= faults
+        posed = set(models[0].reg_image_ids()) if models else set()
+        left_out = [LeftOut(self.numbers[number], reasons[number]) for number in self.numbers if number not in posed]
+        left_out += [LeftOut(name, f"that cannot be read: {why}") for name, why in self.photos.unreadable.items()]
+        common = sorted(self.numbers[number] for number in posed), sorted(left_out, key=lambda photo: photo.name)
+        registered, unposed = map(tuple, common)
+        if not models:
+            return Posing(self.workspace.folder, registered, unposed, seconds=self._seconds)
+        model = models[0]
+        write_model(model, self.numbers, self.workspace.model)
+        return Posing(
+            self.workspace.folder,
+            registered,
+            unposed,
+            cameras=len({model.image(number).camera_id for number in posed}),
+            points=model.num_points3D(),
+            error_px=float(model.compute_mean_reprojection_error()),
+            seconds=self._seconds,
+        )
+
+    def _unmatched(self) -> set[int]:
+        with pycolmap.Database.open(self.workspace.database) as database:
+            pairs, inliers = database.read_two_view_geometry_num_inliers()
+        verified = [pair for pair, count in zip(pairs, inliers, strict=True) if count > 0]
+        return set(self.numbers) - {number for pair in verified for number in pycolmap.pair_id_to_image_pair(pair)}
+
+    @contextmanager
+    def _stage(self, name: str) -> Iterator[Callable[[float], None]]:
+        start, end = STAGES[name]
+
+        def done(share: float) -> None:
+            self._progress(Progress(name, start + (end - start) * share))
+
+        done(0.0)
+        began = time.monotonic()
+        yield done
+        self._seconds[name] = time.monotonic() - began

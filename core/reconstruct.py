@@ -32,7 +32,7 @@ from core.training.voxel_stage import VoxelStage
 STAGE_SHARES = {"voxels": 0.20, "field": 0.22, "texels": 0.52, "bake": 0.06}
 REPORT_INTERVAL_S = 0.5
 # To be raised when a stage keeps other things: checkpoints of another format are ignored, not misread.
-CHECKPOINT_FORMAT = 1
+CHECKPOINT_FORMAT = 2
 PREVIEW_INTERVAL_S = 20.0
 MAX_SEED = 2**31 - 1
 
@@ -123,7 +123,7 @@ class _Run:
             del voxels
         elif stage_name == "field":
             assert state is not None
-            field = FieldStage.restored(pool, state, *common)
+            field = FieldStage.restored(pool, self.region.space, state, *common)
         if stage_name in ("voxels", "field"):
             self._train(field, None)
             with self._timed("texels"):
@@ -131,7 +131,7 @@ class _Run:
             del field
         else:
             assert state is not None
-            texels = TexelStage.restored(pool, state, *common)
+            texels = TexelStage.restored(pool, self.region.space, state, *common)
         self._train(texels, None)
         scene = self._baked(texels)
         self._checkpoint.remove()

@@ -40,7 +40,9 @@ def preview_of_field(
     for o, d in zip(origins.split(RAYS_AT_ONCE), directions.split(RAYS_AT_ONCE), strict=True):
         F, A = marcher.forward(o.contiguous(), d.contiguous(), torch.full((len(o),), 0.5, device=device))
         with torch.no_grad():
-            color = shade(network, F, A, d) + (1.0 - A)[:, None] * torch.tensor(background, device=device)
+            color = shade(network, F, A, frame.directions_to_object(d)) + (1.0 - A)[:, None] * torch.tensor(
+                background, device=device
+            )
         parts.append(color)
     width, height = small.size_px
     return quantised(torch.cat(parts).reshape(height, width, 3).cpu().numpy())

@@ -1,11 +1,11 @@
-"""Where the object is: the training frame, and the cells that it may fill (its visual hull).
+"""Where the scene is: its parameterisation, the training frame, and the cells that it may fill.
 
-Photos with an alpha channel say it outright: a cell that some photo sees only as transparent is empty. Without alpha
-the region is the cube around the point that all cameras look at.
+An object's photos with an alpha channel say it outright: a cell that some photo sees only as transparent is empty (the
+visual hull). Other scenes fill what at least two photos see, but for the air right before the lenses.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import torch
@@ -15,6 +15,9 @@ from torch.nn import functional
 from core.capture import Capture, View
 from core.errors import CaptureEmpty
 from core.field.frame import Frame
+from core.field.space import Space
+from core.rig import Rig
+from core.scene_kind import FORWARD, UNBOUNDED
 
 HULL_CELLS = 64
 # The box around the object is found from coarse to fine: each look's cells are a part of the box before.
@@ -33,23 +36,112 @@ REACH_WITHOUT_ALPHA = 0.5
 MARGIN = 1.04
 
 
+# Forward-facing: the grid begins at this share of the nearest depth, and ends at this multiple of the farthest.
+NEAR_SHARE, FAR_SHARE = 0.9, 1.1
+LEAST_DEPTHS, MOST_DEPTHS = 1.5, 100.0
+# Unbounded: the cube is this much larger than what holds all cameras.
+CAMERA_MARGIN = 1.1
+# Nothing is taken to be nearer to a camera than this share of its distance from what all look at.
+CLEAR_SHARE = 0.1
+
+
 @dataclass(frozen=True)
 class Region:
     """Attributes:
-    frame: the cube that encloses the object.
-    hull: [64, 64, 64] bool, cells of the cube that may hold something.
+    frame: from the object frame to the scene's.
+    hull: [64, 64, 64] bool, cells of the grid that may hold something.
+    space: where the grid lies in the scene's frame.
     """
 
     frame: Frame
     hull: np.ndarray
+    space: Space = field(default_factory=Space.cube)
 
 
 def find_region(capture: Capture) -> Region:
-    """The region of a capture.
+    """The region of a capture, by its kind.
 
     Raises:
         CaptureEmpty: the photos' masks have no point in common.
     """
+    if capture.kind.name == FORWARD:
+        return _forward_region(capture)
+    if capture.kind.name == UNBOUNDED:
+        return _unbounded_region(capture)
+    return _object_region(capture)
+
+
+def _forward_region(capture: Capture) -> Region:
+    """The cameras' mean axis is +z, the nearest depth is 1; wide enough for all that the photos show."""
+    rig = Rig.of(capture.train, capture.points)
+    rotation, centre = _facing(capture.train), rig.origin + rig.middle
+    depths = [np.array(view.depth_range) for view in capture.train if view.depth_range is not None]
+    near, far = (min(d[0] for d in depths), max(d[1] for d in depths)) if depths else rig.near_far
+    half = NEAR_SHARE * near
+    reach = float(np.clip(FAR_SHARE * far / half, LEAST_DEPTHS, MOST_DEPTHS))
+    frame = Frame(centre, half, rotation)
+    space = Space.taper(_tangents(capture.train, frame, reach), reach)
+    return Region(frame, _commonly_seen(capture.train, frame, space), space)
+
+
+def _facing(views: Sequence[View]) -> np.ndarray:
+    """[3, 3], columns are x to the right, y down and z ahead of the mean camera, in the object frame."""
+    ahead = -np.mean([view.camera.world_from_camera[:3, 2] for view in views], 0)
+    up = np.mean([view.camera.world_from_camera[:3, 1] for view in views], 0)
+    z = ahead / np.linalg.norm(ahead)
+    x = np.cross(z, up)
+    if np.linalg.norm(x) < 1e-6:  # the cameras are turned against each other about their axes
+        x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
+    x = x / np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z], 1)
+
+
+def _tangents(views: Sequence[View], frame: Frame, reach: float) -> tuple[float, float]:
+    """Half width and half height, per depth, of all that the photos show between depths 1 and reach."""
+    widest = np.zeros(2)
+    for view in views:
+        width, height = view.camera.size_px
+        corners = np.array([[0, 0], [width, 0], [0, height], [width, height]], float)
+        directions = view.camera.directions(corners) @ frame.rotation
+        origin = frame.to_scene(view.camera.position)
+        ahead = directions[:, 2] > 1e-3
+        for depth in (1.0, reach):
+            points = origin + directions[ahead] * ((depth - origin[2]) / directions[ahead, 2])[:, None]
+            widest = np.maximum(widest, np.abs(points[:, :2]).max(0, initial=0.0) / depth)
+    return float(max(widest[0], 1e-3)), float(max(widest[1], 1e-3))
+
+
+def _unbounded_region(capture: Capture) -> Region:
+    """The cube around what all look at that holds all cameras, and shells around it."""
+    rig = Rig.of(capture.train, capture.points)
+    centre = rig.origin + rig.looked_at
+    away = np.abs(rig.positions - rig.looked_at).max(1)
+    half = CAMERA_MARGIN * float(away.max()) or 1.0
+    frame = Frame(centre, half)
+    space = Space.shells()
+    return Region(frame, _commonly_seen(capture.train, frame, space), space)
+
+
+def _commonly_seen(views: Sequence[View], frame: Frame, space: Space) -> np.ndarray:
+    """[64]^3 bool: cells of the grid within at least two photos, not right before a lens."""
+    ticks = (np.arange(HULL_CELLS) + 0.5) * (2.0 / HULL_CELLS) - 1.0
+    grid = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), -1).reshape(-1, 3)
+    points = frame.to_object(space.to_scene(grid))
+    clear = CLEAR_SHARE * np.array([np.linalg.norm(view.camera.position - frame.centre) for view in views])
+    seen, blocked = np.zeros(len(points), np.int32), np.zeros(len(points), bool)
+    for view, radius in zip(views, clear, strict=True):
+        camera = view.camera
+        local = (points - camera.position) @ camera.world_from_camera[:3, :3]
+        depth = np.maximum(-local[:, 2], 1e-12)
+        x = local[:, 0] / depth * camera.focal_px[0] + camera.centre_px[0]
+        y = camera.centre_px[1] - local[:, 1] / depth * camera.focal_px[1]
+        width, height = camera.size_px
+        seen += (local[:, 2] < 0) & (x >= 0) & (y >= 0) & (x < width) & (y < height)
+        blocked |= (local**2).sum(-1) < radius**2
+    return ((seen >= 2) & ~blocked).reshape((HULL_CELLS,) * 3)
+
+
+def _object_region(capture: Capture) -> Region:
     centre, distances = _looked_at(capture.train)
     everything = np.ones((HULL_CELLS,) * 3, bool)
     if not capture.has_alpha:

@@ -11,6 +11,7 @@ from torch.nn import functional
 
 from core.conventions import FEATURE_CHANNELS
 from core.field.parameters import Parameters
+from core.field.space import CUBE, Space
 from core.kernels.march import VoxelGrid
 
 # Raw density scales with the cube, so that a grid of any resolution starts equally thin.
@@ -21,40 +22,45 @@ HIGHEST_DENSITY = 30.0
 # A cell stays if its mean density over 3^3 nodes is above this: single nodes are noise (Adam moves them a full step).
 KEPT_DENSITY = -0.05
 STEP_PER_NODE = 0.75
+# A ray through a warped grid bends, but turns back at most once along each axis of [-1, 1]^3.
+LONGEST_BENT_WAY = 12.0
 
 
 @dataclass
 class VoxelField:
     """Attributes:
+    space: where the grid lies.
     nodes: per axis.
     parameters: of nodes^3 entries, scalar = raw density.
     occupied: [cells, cells, cells] bool.
     active: indices (int32) of the nodes near occupied cells; the only ones that train.
     """
 
+    space: Space
     nodes: int
     parameters: Parameters
     occupied: Tensor
     active: Tensor
 
     @classmethod
-    def new(cls, nodes: int, hull: np.ndarray, seed: int, device: str) -> "VoxelField":
+    def new(cls, space: Space, nodes: int, hull: np.ndarray, seed: int, device: str) -> "VoxelField":
         generator = torch.Generator().manual_seed(seed)
         n = nodes**3
         noise = torch.randn(n, FEATURE_CHANNELS, generator=generator)
         density = torch.full((n,), INITIAL_DENSITY)
         parameters = Parameters.starting_from(density.to(device), (0.5 + 0.02 * noise).to(device))
         occupied = torch.from_numpy(hull.copy()).to(device)
-        return cls(nodes, parameters, occupied, _active_nodes(occupied, nodes))
+        return cls(space, nodes, parameters, occupied, _active_nodes(occupied, nodes))
 
     @property
     def step(self) -> float:
-        """Marching step, cube units."""
+        """Marching step, grid units."""
         return 2.0 / (self.nodes - 1) * STEP_PER_NODE
 
     def max_samples(self) -> int:
         """No ray can take more steps than this."""
-        return int(np.ceil(2.0 * np.sqrt(3.0) / self.step)) + 2
+        longest = 2.0 * np.sqrt(3.0) if self.space.kind == CUBE else LONGEST_BENT_WAY
+        return int(np.ceil(longest / self.step)) + 2
 
     def upsampled(self, nodes: int) -> "VoxelField":
         """The same field on a finer grid, with fresh moments."""
@@ -63,7 +69,7 @@ class VoxelField:
         fine = functional.interpolate(grid, size=(nodes,) * 3, mode="trilinear", align_corners=True)
         fine = fine[0].reshape(1 + FEATURE_CHANNELS, -1)
         parameters = Parameters.starting_from(fine[0].contiguous(), fine[1:].T.contiguous())
-        return VoxelField(nodes, parameters, self.occupied, _active_nodes(self.occupied, nodes))
+        return VoxelField(self.space, nodes, parameters, self.occupied, _active_nodes(self.occupied, nodes))
 
     def update_occupancy(self, cells: int, hull: np.ndarray) -> None:
         """Drops what is empty: cells whose averaged density is low, and cells outside of the hull."""
@@ -80,6 +86,7 @@ class VoxelField:
     def grid(self) -> VoxelGrid:
         """The field as kernels read it."""
         grid = VoxelGrid()
+        grid.space = self.space.kernel_space()
         grid.nodes, grid.cells = self.nodes, self.occupied.shape[0]
         grid.density = wp.from_torch(self.parameters.scalar)
         grid.features = self.parameters.feature_state().value

@@ -5,6 +5,7 @@ Entries that no ray touched keep their moments: an update without a gradient wou
 
 import warp as wp
 
+from core.kernels.space import Space, from_cells, gradient_in_cells, to_cells
 from core.kernels.types import vec8
 
 wp.set_module_options({"enable_backward": False})
@@ -118,6 +119,7 @@ def adam_texels(
 @wp.kernel
 def adam_vertices(
     first: int,
+    space: Space,
     value: wp.array(dtype=wp.vec3),
     grad: wp.array2d(dtype=wp.vec3),
     moment1: wp.array(dtype=wp.vec3),
@@ -128,7 +130,10 @@ def adam_vertices(
     pull: float,
     bias: wp.vec2,
 ):
-    """Steps the vertices, keeps each within `reach` of its cell's centre, and pulls it back there a little (eq. 6)."""
+    """Steps the vertices, keeps each within `reach` of its cell's centre, and pulls it back there a little (eq. 6).
+
+    Steps, moments and centres are in the cells' cube; values and their gradients are in the scene.
+    """
     i = first + wp.tid()
     g = wp.vec3()
     for p in range(grad.shape[0]):
@@ -136,16 +141,17 @@ def adam_vertices(
         grad[p, i] = wp.vec3()
     if wp.length_sq(g) == 0.0:
         return
+    g = gradient_in_cells(space, value[i], g)
     m = BETA1 * moment1[i] + (1.0 - BETA1) * g
     v = BETA2 * moment2[i] + (1.0 - BETA2) * wp.cw_mul(g, g)
     moment1[i] = m
     moment2[i] = v
-    x = value[i] - centre[i]
+    x = to_cells(space, value[i]) - centre[i]
     for a in range(3):
         x[a] = wp.clamp(x[a] - rate * (m[a] / bias[0]) / (wp.sqrt(v[a] / bias[1]) + 1.0e-20), -reach, reach) * (
             1.0 - pull
         )
-    value[i] = centre[i] + x
+    value[i] = from_cells(space, centre[i] + x)
 
 
 def bias_correction(steps: int) -> wp.vec2:

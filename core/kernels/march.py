@@ -3,13 +3,28 @@
 Symbols: a sample n of a ray has opacity a_n = 1 - exp(-relu(raw) * density_scale * step), transmittance
 T_n = prod_{m<n} (1 - a_m), weight w_n = T_n a_n. A ray yields F = sum w_n f_n and A = sum w_n (eq. 2).
 
+Steps are even in the grid, not in the scene: where the grid is warped (core/field/space.py), a ray's way bends through
+it, and a step's length along the ray follows the grid's own speed there. Opacity and the distortion loss measure
+distance s in the grid; in a cube, s = t.
+
 Gradient without division: with s_n = dL/dw_n and B_n = what lies behind (B_last = 0,
 B_{n-1} = a_n s_n + (1 - a_n) B_n), dL/da_n = T_n (s_n - B_n).
 """
 
 import warp as wp
 
-from core.kernels.types import FAR, cell_of, corner_offset, corner_weight, cube_span, node_of, safe_inverse, vec8
+from core.kernels.space import (
+    CUBE,
+    SHELLS,
+    Space,
+    grid_span,
+    grid_velocity,
+    largest_axis,
+    nearest_shell_cell,
+    to_cells,
+    to_grid,
+)
+from core.kernels.types import FAR, cell_of, corner_offset, corner_weight, node_of, safe_inverse, vec8
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -23,6 +38,7 @@ MIN_FEATURE_WEIGHT = wp.constant(1.0e-4)
 
 @wp.struct
 class VoxelGrid:
+    space: Space
     nodes: int  # per axis
     density: wp.array(dtype=float)  # raw, [nodes^3]
     features: wp.array(dtype=vec8)  # [nodes^3]
@@ -34,7 +50,8 @@ class VoxelGrid:
 
 @wp.struct
 class Samples:
-    t: wp.array2d(dtype=float)  # [rays, capacity]
+    t: wp.array2d(dtype=float)  # [rays, capacity], along the ray
+    s: wp.array2d(dtype=float)  # in the grid
     alpha: wp.array2d(dtype=float)
     transmittance: wp.array2d(dtype=float)
     features: wp.array2d(dtype=vec8)
@@ -42,8 +59,18 @@ class Samples:
 
 
 @wp.func
-def steps_to_next_cell(p: wp.vec3, d: wp.vec3, cells: int, step: float):
-    """Whole steps that take a ray out of its cell, at least 1."""
+def step_along(grid: VoxelGrid, p: wp.vec3, d: wp.vec3):
+    """How far a ray goes, in the scene, in one step through the grid."""
+    if grid.space.kind == CUBE:
+        return grid.step
+    return grid.step / wp.length(grid_velocity(grid.space, p, d))
+
+
+@wp.func
+def steps_to_next_cell(space: Space, p: wp.vec3, d: wp.vec3, cells: int, step: float):
+    """Whole steps that take a ray out of its cell, at least 1; always 1 where its way bends."""
+    if space.kind != CUBE:
+        return 1.0
     size = 2.0 / float(cells)
     leave = float(FAR)
     for axis in range(3):
@@ -69,8 +96,10 @@ def march_forward(
     r = first + wp.tid()
     o = origins[r]
     d = directions[r]
-    start, stop = cube_span(o, d, 0.9999)
-    t = start + grid.step * jitter[r]
+    t, stop = grid_span(grid.space, o, d, 0.9999)
+    if t < stop:
+        t += jitter[r] * step_along(grid, o + t * d, d)
+    s = t
     capacity = samples.t.shape[1]
     T = float(1.0)
     A = float(0.0)
@@ -78,10 +107,14 @@ def march_forward(
     n = int(0)
     while t < stop:
         p = o + t * d
-        if grid.occupied[cell_of(p, grid.cells)] == wp.uint8(0):
-            t += steps_to_next_cell(p, d, grid.cells, grid.step) * grid.step
+        g = to_grid(grid.space, p)
+        advance = step_along(grid, p, d)
+        if grid.occupied[cell_of(g, grid.cells)] == wp.uint8(0):
+            steps = steps_to_next_cell(grid.space, p, d, grid.cells, grid.step)
+            t += steps * advance
+            s += steps * grid.step
         else:
-            base, f = node_of(p, grid.nodes)
+            base, f = node_of(g, grid.nodes)
             raw = float(0.0)
             for c in range(8):
                 raw += corner_weight(c, f) * grid.density[base + corner_offset(c, grid.nodes)]
@@ -96,6 +129,7 @@ def march_forward(
                 if raw > 0.0:
                     a = 1.0 - wp.exp(-raw * grid.density_scale * grid.step)
                 samples.t[r, n] = t
+                samples.s[r, n] = s
                 samples.alpha[r, n] = a
                 samples.transmittance[r, n] = T
                 samples.features[r, n] = feature
@@ -105,7 +139,8 @@ def march_forward(
                 T *= 1.0 - a
                 if T < OPAQUE:
                     break
-            t += grid.step
+            t += advance
+            s += grid.step
     samples.count[r] = n
     features[r] = F
     alpha[r] = A
@@ -133,31 +168,31 @@ def march_backward(
     gF = grad_F[r]
     gA = grad_A[r]
     count = wp.min(samples.count[r], samples.t.shape[1])
-    W = float(0.0)  # sums of w and w t over all samples
-    Wt = float(0.0)
+    W = float(0.0)  # sums of w and w s over all samples
+    Ws = float(0.0)
     for n in range(count):
         w = samples.transmittance[r, n] * samples.alpha[r, n]
         W += w
-        Wt += w * samples.t[r, n]
+        Ws += w * samples.s[r, n]
     behind = float(0.0)
     W_behind = float(0.0)
-    Wt_behind = float(0.0)
+    Ws_behind = float(0.0)
     for k in range(count):
         n = count - 1 - k
-        t = samples.t[r, n]
+        s = samples.s[r, n]
         a = samples.alpha[r, n]
         T = samples.transmittance[r, n]
         w = T * a
         W_front = W - W_behind - w
-        Wt_front = Wt - Wt_behind - w * t
-        spread = t * W_front - Wt_front + Wt_behind - t * W_behind + w * grid.step / 3.0
-        s = gA + wp.dot(gF, samples.features[r, n]) + distortion * 2.0 * spread
+        Ws_front = Ws - Ws_behind - w * s
+        spread = s * W_front - Ws_front + Ws_behind - s * W_behind + w * grid.step / 3.0
+        grad_w = gA + wp.dot(gF, samples.features[r, n]) + distortion * 2.0 * spread
         W_behind += w
-        Wt_behind += w * t
-        grad_alpha = T * (s - behind)
-        behind = a * s + (1.0 - a) * behind
+        Ws_behind += w * s
+        grad_alpha = T * (grad_w - behind)
+        behind = a * grad_w + (1.0 - a) * behind
         grad_raw = grad_alpha * (1.0 - a) * grid.step * grid.density_scale
-        base, f = node_of(o + t * d, grid.nodes)
+        base, f = node_of(to_grid(grid.space, o + samples.t[r, n] * d), grid.nodes)
         for c in range(8):
             node = base + corner_offset(c, grid.nodes)
             weight = corner_weight(c, f)
@@ -173,19 +208,26 @@ def survey(
     origins: wp.array(dtype=wp.vec3),
     directions: wp.array(dtype=wp.vec3),
     samples: Samples,
+    space: Space,
     cells: int,
+    shells: int,
     part: int,
     peak: wp.array2d(dtype=float),  # [parts, cells^3], largest w seen in the cell
     mass: wp.array2d(dtype=float),  # [parts, cells^3], sum of w
-    moment: wp.array2d(dtype=wp.vec3),  # [parts, cells^3], sum of w p
+    moment: wp.array2d(dtype=wp.vec3),  # [parts, cells^3], sum of w times the place among the cells
+    shell_peak: wp.array2d(dtype=float),  # [parts, (shells + 1) * 6 * cells^2], largest w seen near the shell's cell
 ):
-    """What the rays saw in each cell."""
+    """What the rays saw in each cell of the mesh, and of the shells around it."""
     r = first + wp.tid()
     for n in range(wp.min(samples.count[r], samples.t.shape[1])):
         w = samples.transmittance[r, n] * samples.alpha[r, n]
         if w > 1.0e-3:
             p = origins[r] + samples.t[r, n] * directions[r]
-            cell = cell_of(p, cells)
-            wp.atomic_max(peak, part, cell, w)
-            wp.atomic_add(mass, part, cell, w)
-            wp.atomic_add(moment, part, cell, w * p)
+            if space.kind == SHELLS and wp.abs(p[largest_axis(p)]) > 1.0:
+                wp.atomic_max(shell_peak, part, nearest_shell_cell(space, p, shells, cells), w)
+            else:
+                g = to_cells(space, p)
+                cell = cell_of(g, cells)
+                wp.atomic_max(peak, part, cell, w)
+                wp.atomic_add(mass, part, cell, w)
+                wp.atomic_add(moment, part, cell, w * g)

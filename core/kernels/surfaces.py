@@ -3,6 +3,7 @@
 import warp as wp
 
 from core.kernels.composite import backward_kernel, composite_kernel
+from core.kernels.space import Space, grid_velocity, to_grid
 from core.kernels.trace import QuadMesh, corner_weights, trace_kernel
 from core.kernels.types import corner_offset, corner_weight, node_of, vec8
 
@@ -14,8 +15,9 @@ GRAZING = wp.constant(0.1)
 
 @wp.struct
 class Volume:
-    """Opacity and features on a grid of nodes over the cube, trilinear in between."""
+    """Opacity and features on a grid of nodes, trilinear in between."""
 
+    space: Space
     nodes: int
     alpha: wp.array(dtype=float)
     features: wp.array(dtype=vec8)
@@ -51,7 +53,7 @@ class TexelGradients:
 
 @wp.func
 def volume_alpha(volume: Volume, quad: int, ab: wp.vec2, p: wp.vec3):
-    base, f = node_of(p, volume.nodes)
+    base, f = node_of(to_grid(volume.space, p), volume.nodes)
     alpha = float(0.0)
     for c in range(8):
         alpha += corner_weight(c, f) * volume.alpha[base + corner_offset(c, volume.nodes)]
@@ -60,7 +62,7 @@ def volume_alpha(volume: Volume, quad: int, ab: wp.vec2, p: wp.vec3):
 
 @wp.func
 def volume_features(volume: Volume, quad: int, ab: wp.vec2, p: wp.vec3):
-    base, f = node_of(p, volume.nodes)
+    base, f = node_of(to_grid(volume.space, p), volume.nodes)
     features = vec8()
     for c in range(8):
         features += corner_weight(c, f) * volume.features[base + corner_offset(c, volume.nodes)]
@@ -81,8 +83,9 @@ def volume_scatter(
     grad_alpha: float,
     grad_features: vec8,
 ):
-    base, f = node_of(o + t * d, volume.nodes)
-    slope = wp.vec3()  # dL/dp, in node spacings
+    p = o + t * d
+    base, f = node_of(to_grid(volume.space, p), volume.nodes)
+    slope = wp.vec3()  # dL/d(grid point), in node spacings
     for c in range(8):
         node = base + corner_offset(c, volume.nodes)
         weight = corner_weight(c, f)
@@ -100,12 +103,15 @@ def volume_scatter(
         )
     # The hit moves along the ray as its triangle moves: dt/dv_i = weight_i n / (n . d).
     q = mesh.quads[quad]
+    if q[0] >= mesh.movable:
+        return
     middle = wp.where(ab[1] >= ab[0], q[1], q[2])
     v0 = mesh.vertices[q[0]]
     n = wp.normalize(wp.cross(mesh.vertices[middle] - v0, mesh.vertices[q[3]] - v0))
     facing = wp.dot(n, d)
     if wp.abs(facing) > GRAZING:
-        along = wp.dot(slope, d) * float(volume.nodes - 1) * 0.5 / facing
+        velocity = grid_velocity(volume.space, p, d)
+        along = wp.dot(slope, velocity) * float(volume.nodes - 1) * 0.5 / facing
         weights = corner_weights(ab)
         wp.atomic_add(gradients.vertices, part, q[0], (weights[0] * along) * n)
         wp.atomic_add(gradients.vertices, part, middle, ((weights[1] + weights[2]) * along) * n)

@@ -4,6 +4,9 @@ A ray walks through the cells of the P grid (Amanatides and Woo 1987). Each kept
 that use its vertex; a hit counts only if it lies within that cell's stretch of the ray. A quad lies in the block of its
 four cells, so every hit is found exactly once and in order.
 
+Cells are bounded by planes in every parameterisation (core/field/space.py), and a ray crosses those of an axis in one
+direction only. Shells, where there are any, are cubes around everything else: a ray from within leaves each once.
+
 Triangles are hit by edge functions in a frame aligned with the ray; the two triangles of a quad share its diagonal, so
 that no ray slips between them.
 """
@@ -14,7 +17,8 @@ from typing import Any
 
 import warp as wp
 
-from core.kernels.types import FAR, PARALLEL, cube_span, vec8
+from core.kernels.space import TAPER, Space, cells_span, heading, shell_cell, to_cells
+from core.kernels.types import FAR, NEAR, PARALLEL, vec8
 
 OPTIONS = {"enable_backward": False, "fast_math": True}
 wp.set_module_options(OPTIONS)
@@ -27,6 +31,7 @@ OPAQUE = wp.constant(1.0e-3)
 class QuadMesh:
     """A quad's corners stand in the order 00, 01, 10, 11 of its (a, b) coordinates; its diagonal runs from 00 to 11."""
 
+    space: Space
     cells: int  # P, per axis
     cell_slot: wp.array(dtype=wp.int32)  # [P^3] -> slot, or -(cells to the nearest cell that has one)
     slot_start: wp.array(dtype=wp.int32)  # [slots + 1] into slot_quads
@@ -34,6 +39,9 @@ class QuadMesh:
     quads: wp.array(dtype=wp.vec4i)  # [Q] -> vertices
     vertices: wp.array(dtype=wp.vec3)
     balls: wp.array(dtype=wp.vec4)  # [Q], centre and squared radius of a ball around each quad
+    movable: int  # vertices from here on stay where they are
+    shell_halves: wp.array(dtype=float)  # [shells], half edges, growing
+    shell_quads: wp.array(dtype=wp.int32)  # [shells * 6 * P^2] -> quad, or -1
 
 
 @wp.struct
@@ -149,46 +157,68 @@ def cell_at(p: wp.vec3, P: int):
 
 
 @wp.func
-def axis_inverse(d: float):
-    """1 / d; huge where a ray runs parallel to the planes of an axis."""
-    return wp.where(wp.abs(d) < PARALLEL, FAR, 1.0 / d)
+def plane_distance(value: float, slope: float):
+    """t where value + slope t = 0; FAR where that lies behind, or the ray runs parallel to the plane."""
+    if wp.abs(slope) < PARALLEL:
+        return float(FAR)
+    t = -value / slope
+    return wp.where(t < 0.0, float(FAR), t)
 
 
 @wp.func
-def exit_distance(o: float, inverse: float, cell: int, reach: int, size: float):
-    """Where a ray passes the far side, along one axis, of the block of cells less than `reach` from a cell."""
-    side = wp.where(inverse > 0.0, cell + reach, cell - reach + 1)
-    return wp.where(inverse == FAR, FAR, (float(side) * size - 1.0 - o) * inverse)
+def side_coordinate(way: float, cell: int, reach: int, size: float):
+    """Where, along one axis of the cells' cube, the far side lies of the block of cells less than `reach` from one."""
+    return float(wp.where(way > 0.0, cell + reach, cell - reach + 1)) * size - 1.0
 
 
 @wp.func
-def block_exit(o: wp.vec3, inverse: wp.vec3, cell: wp.vec3i, reach: int, size: float):
-    return wp.vec3(
-        exit_distance(o[0], inverse[0], cell[0], reach, size),
-        exit_distance(o[1], inverse[1], cell[1], reach, size),
-        exit_distance(o[2], inverse[2], cell[2], reach, size),
-    )
+def block_exit(space: Space, o: wp.vec3, d: wp.vec3, way: wp.vec3, cell: wp.vec3i, reach: int, size: float):
+    """Where a ray passes the far sides of the block of cells less than `reach` from a cell, per axis."""
+    x = side_coordinate(way[0], cell[0], reach, size)
+    y = side_coordinate(way[1], cell[1], reach, size)
+    z = side_coordinate(way[2], cell[2], reach, size)
+    if space.kind == TAPER:
+        u = x * space.tangent[0]
+        v = y * space.tangent[1]
+        depth = wp.exp(space.growth * (z + 1.0) * 0.5)
+        return wp.vec3(
+            plane_distance(o[0] - u * o[2], d[0] - u * d[2]),
+            plane_distance(o[1] - v * o[2], d[1] - v * d[2]),
+            plane_distance(o[2] - depth, d[2]),
+        )
+    return wp.vec3(plane_distance(o[0] - x, d[0]), plane_distance(o[1] - y, d[1]), plane_distance(o[2] - z, d[2]))
 
 
 @wp.func
-def next_along(p: float, inverse: float, cell: int, reach: int, crossed: bool, half_cells: float):
+def next_along(g: float, way: float, cell: int, reach: int, crossed: bool, half_cells: float):
     """The next cell along one axis: just outside of the block where the ray crossed its side, else within it."""
-    outside = wp.where(inverse > 0.0, cell + reach, cell - reach)
-    inside = wp.clamp(int((p + 1.0) * half_cells), cell - reach + 1, cell + reach - 1)
+    outside = wp.where(way > 0.0, cell + reach, cell - reach)
+    inside = wp.clamp(int((g + 1.0) * half_cells), cell - reach + 1, cell + reach - 1)
     return wp.where(crossed, outside, inside)
 
 
 @wp.func
-def next_cell(p: wp.vec3, inverse: wp.vec3, cell: wp.vec3i, reach: int, leave: wp.vec3, half_cells: float):
-    """The cell behind the block of cells around `cell` that the ray leaves at p; P or -1 outside of the grid."""
+def next_cell(g: wp.vec3, way: wp.vec3, cell: wp.vec3i, reach: int, leave: wp.vec3, half_cells: float):
+    """The cell behind the block of cells around `cell` that the ray leaves at g; P or -1 outside of the cells."""
     crosses_x = leave[0] <= leave[1] and leave[0] <= leave[2]
     crosses_y = not crosses_x and leave[1] <= leave[2]
     crosses_z = not crosses_x and not crosses_y
     return wp.vec3i(
-        next_along(p[0], inverse[0], cell[0], reach, crosses_x, half_cells),
-        next_along(p[1], inverse[1], cell[1], reach, crosses_y, half_cells),
-        next_along(p[2], inverse[2], cell[2], reach, crosses_z, half_cells),
+        next_along(g[0], way[0], cell[0], reach, crosses_x, half_cells),
+        next_along(g[1], way[1], cell[1], reach, crosses_y, half_cells),
+        next_along(g[2], way[2], cell[2], reach, crosses_z, half_cells),
     )
+
+
+@wp.func
+def cube_exit(half: float, o: wp.vec3, d: wp.vec3):
+    """Where a ray from within the cube [-half, half]^3 leaves it; not positive where it lies behind."""
+    leave = float(FAR)
+    for axis in range(3):
+        if wp.abs(d[axis]) >= PARALLEL:
+            side = wp.where(d[axis] > 0.0, half, -half)
+            leave = wp.min(leave, (side - o[axis]) / d[axis])
+    return leave
 
 
 @wp.func
@@ -223,22 +253,23 @@ def trace_kernel(alpha_of: Callable[..., float], surface_type: Any) -> wp.Kernel
         d = directions[r]
         capacity = hits.t.shape[1]
         P = mesh.cells
-        t, stop = cube_span(o, d, 0.99999)
+        t, stop = cells_span(mesh.space, o, d, 0.99999)
         e1 = perpendicular(d)
         e2 = wp.cross(d, e1)
-        inverse = wp.vec3(axis_inverse(d[0]), axis_inverse(d[1]), axis_inverse(d[2]))
+        way = heading(mesh.space, o, d)
         size = 2.0 / float(P)
         half_cells = 0.5 * float(P)
-        cell = cell_at(o + t * d, P)
+        cell = cell_at(to_cells(mesh.space, o + t * d), P)
         T = float(1.0)
         opaque = int(0)
         n = int(0)
+        lit = bool(True)
         alive = t < stop
         while alive:
             slot = mesh.cell_slot[(cell[0] * P + cell[1]) * P + cell[2]]
             # An empty cell tells how far around it all others are empty too: leave that block in one go.
             reach = wp.max(-slot, 1)
-            leave = block_exit(o, inverse, cell, reach, size)
+            leave = block_exit(mesh.space, o, d, way, cell, reach, size)
             t_leave = wp.min(leave)
             if slot >= 0:
                 lowest = n
@@ -259,11 +290,29 @@ def trace_kernel(alpha_of: Callable[..., float], surface_type: Any) -> wp.Kernel
                     m += 1
                     if opaque >= 2 and (binary_only == 1 or T < OPAQUE):
                         n = m
-                        alive = False
+                        lit = False
             t = t_leave
-            cell = next_cell(o + t * d, inverse, cell, reach, leave, half_cells)
+            cell = next_cell(to_cells(mesh.space, o + t * d), way, cell, reach, leave, half_cells)
             outside = wp.min(cell) < 0 or wp.max(cell) >= P
-            alive = alive and t < stop and n < capacity and not outside
+            alive = lit and t < stop and n < capacity and not outside
+        shell = int(0)
+        while lit and n < capacity and shell < mesh.shell_halves.shape[0]:
+            t = cube_exit(mesh.shell_halves[shell], o, d)
+            index, ab = shell_cell(shell, o + t * d, P)
+            quad = mesh.shell_quads[index]
+            if quad >= 0 and t > NEAR:
+                alpha = alpha_of(surface, quad, ab, o + t * d)
+                hits.quad[r, n] = quad
+                hits.ab[r, n] = ab
+                hits.t[r, n] = t
+                hits.alpha[r, n] = alpha
+                hits.transmittance[r, n] = T
+                T *= 1.0 - alpha
+                if alpha > 0.5:
+                    opaque += 1
+                n += 1
+                lit = opaque < 2 or (binary_only == 0 and T >= OPAQUE)
+            shell += 1
         hits.count[r] = n
 
     return trace

@@ -1,6 +1,10 @@
-"""The quad mesh (paper 3.1): one vertex per kept cell of a P^3 grid, one quad per grid edge between four kept cells."""
+"""The quad mesh (paper 3.1): one vertex per kept cell of a P^3 grid, one quad per grid edge between four kept cells.
 
-from dataclasses import dataclass, replace
+Around an unbounded scene's cells stand shells: concentric cubes whose faces are cut into P x P quads that stay where they
+are (supplement H).
+"""
+
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
@@ -9,6 +13,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from core.errors import TrainingFailed
+from core.field.space import SHELLS, Space
 from core.kernels.launch import launch
 from core.kernels.trace import QuadMesh as KernelMesh
 from core.kernels.trace import bound_quads
@@ -16,38 +21,50 @@ from core.kernels.trace import bound_quads
 # A vertex may go this far from its cell's centre, in cells: within the cell, so that rays find every hit.
 VERTEX_REACH = 0.49
 CORNERS = 4
+FACES = 6
 # Empty space is skipped in blocks of at most this many cells to each side.
 FARTHEST = 16
 
 
 @dataclass(frozen=True)
 class QuadMesh:
-    """A mesh in the cube's frame.
+    """A mesh in the scene's frame.
 
     Attributes:
         cells: P, per axis.
-        kept: [V] int64, the flat index of each vertex's cell.
-        vertices: [V, 3] float32 tensor, trained in place.
+        kept: [V] int64, the flat index of each movable vertex's cell.
+        vertices: [V + S, 3] float32 tensor, scene points: the V movable ones, trained in place, then the shells'.
         quads: [Q, 4] int32, vertices at the corners 00, 01, 10, 11; the diagonal runs from 00 to 11.
+        space: where the cells lie.
+        shell_cells: [Q] int64, a shell's quad's cell among those of all shells' faces; -1 for other quads. Empty: none.
     """
 
     cells: int
     kept: np.ndarray
     vertices: Tensor
     quads: np.ndarray
+    space: Space = field(default_factory=Space.cube)
+    shell_cells: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
 
     @property
     def cell_size(self) -> float:
+        """In the cells' own cube [-1, 1]^3."""
         return 2.0 / self.cells
 
+    @property
+    def shells(self) -> int:
+        """Shells besides the innermost one: they begin as far apart as the cells are large."""
+        return shells_around(self.space, self.cells)
+
     def centres(self) -> np.ndarray:
-        """[V, 3] float32, the cells' centres."""
+        """[V, 3] float32, the cells' centres in their cube [-1, 1]^3."""
         ijk = np.stack(np.unravel_index(self.kept, (self.cells,) * 3), -1)
         return ((ijk + 0.5) * self.cell_size - 1.0).astype(np.float32)
 
     def with_quads(self, keep: np.ndarray) -> "QuadMesh":
         """The mesh with some of its quads, [Q] bool."""
-        return replace(self, quads=np.ascontiguousarray(self.quads[keep]))
+        shell_cells = self.shell_cells[keep] if len(self.shell_cells) else self.shell_cells
+        return replace(self, quads=np.ascontiguousarray(self.quads[keep]), shell_cells=shell_cells)
 
     def kernel_mesh(self, device: str) -> KernelMesh:
         """The mesh as kernels read it: each cell with the quads that use its vertex."""
@@ -57,34 +74,50 @@ class QuadMesh:
         slots = -_distance_to(self.kept, self.cells)
         slots[self.kept] = np.arange(len(self.kept))
         mesh = KernelMesh()
-        mesh.cells = self.cells
+        mesh.cells, mesh.space, mesh.movable = self.cells, self.space.kernel_space(), len(self.kept)
         mesh.cell_slot = wp.array(slots, dtype=wp.int32, device=device)
         mesh.slot_start = wp.array(start.astype(np.int32), dtype=wp.int32, device=device)
         mesh.slot_quads = wp.array((order // CORNERS).astype(np.int32), dtype=wp.int32, device=device)
         mesh.quads = wp.array(self.quads, dtype=wp.vec4i, device=device)
         mesh.vertices = wp.from_torch(self.vertices, dtype=wp.vec3)
         mesh.balls = wp.zeros(len(self.quads), dtype=wp.vec4, device=device)
+        halves = self.space.shell_halves(self.shells).astype(np.float32)
+        shell_quads = np.full(len(halves) * FACES * self.cells**2, -1, np.int32)
+        if len(self.shell_cells):
+            of_shells = np.flatnonzero(self.shell_cells >= 0)
+            shell_quads[self.shell_cells[of_shells]] = of_shells
+        mesh.shell_halves = wp.array(halves, dtype=wp.float32, device=device)
+        mesh.shell_quads = wp.array(shell_quads, dtype=wp.int32, device=device)
         launch(bound_quads, len(self.quads), [mesh], device)
         return mesh
 
 
-def build_mesh(solid: np.ndarray, centroid: np.ndarray, device: str) -> QuadMesh:
-    """The mesh between solid cells.
+def shells_around(space: Space, cells: int) -> int:
+    """How many shells stand around a space's cells, besides the one on their rim."""
+    return cells // 2 if space.kind == SHELLS else 0
+
+
+def build_mesh(
+    solid: np.ndarray, centroid: np.ndarray, device: str, space: Space | None = None, shells: np.ndarray | None = None
+) -> QuadMesh:
+    """The mesh between solid cells, and the shells' seen quads.
 
     Args:
         solid: [P, P, P] bool, cells that rays saw something in.
-        centroid: [P, P, P, 3], where in the cube they saw it; not finite where unknown.
+        centroid: [P, P, P, 3], where in the cells' cube they saw it; not finite where unknown.
+        shells: [shells + 1, 6, P, P] bool, cells of the shells' faces that rays saw something near.
 
     Raises:
         TrainingFailed: no quad is left.
     """
-    cells = solid.shape[0]
+    cells, space = solid.shape[0], space or Space.cube()
     solid = solid.copy()
     for axis in range(3):  # a vertex on the cube's rim would have quads that leave it
         np.moveaxis(solid, axis, 0)[[0, -1]] = False
     index = np.arange(cells**3).reshape(solid.shape)
     corners = np.concatenate([_quads_across(solid, index, axis) for axis in range(3)])
-    if len(corners) == 0:
+    shell_vertices, shell_quads, shell_cells = _shell_quads(space, cells, shells)
+    if len(corners) + len(shell_quads) == 0:
         raise TrainingFailed(
             "mesh",
             "some surface must have been found",
@@ -92,13 +125,35 @@ def build_mesh(solid: np.ndarray, centroid: np.ndarray, device: str) -> QuadMesh
             "Check the poses and the background; a capture needs photos that overlap.",
         )
     kept, quads = np.unique(corners, return_inverse=True)
-    mesh = QuadMesh(cells, kept, torch.empty(0), quads.reshape(-1, CORNERS).astype(np.int32))
+    quads = np.concatenate([quads.reshape(-1, CORNERS), shell_quads + len(kept)]).astype(np.int32)
+    of_shells = np.concatenate([np.full(len(corners), -1), shell_cells]) if len(shell_cells) else np.zeros(0, np.int64)
+    mesh = QuadMesh(cells, kept, torch.empty(0), quads, space, of_shells)
     centres = mesh.centres()
     seen = centroid.reshape(-1, 3)[kept]
     reach = VERTEX_REACH * mesh.cell_size
     moved = np.clip(np.where(np.isfinite(seen), seen - centres, 0.0), -reach, reach)
-    vertices = torch.from_numpy((centres + moved).astype(np.float32)).to(device)
-    return replace(mesh, vertices=vertices)
+    vertices = np.concatenate([space.cells_to_scene(centres + moved), shell_vertices])
+    return replace(mesh, vertices=torch.from_numpy(vertices.astype(np.float32)).to(device))
+
+
+def _shell_quads(space: Space, cells: int, seen: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(vertices [S, 3], quads [n, 4], cells [n]) of the shells' seen quads; faces go by axis, the negative one first."""
+    if seen is None or not seen.any():
+        return np.zeros((0, 3)), np.zeros((0, CORNERS), np.int64), np.zeros(0, np.int64)
+    flat = np.flatnonzero(seen)
+    shell, face, i, j = np.unravel_index(flat, seen.shape)
+    half = space.shell_halves(shells_around(space, cells))[shell]
+    axis, side = face // 2, np.where(face % 2, 1.0, -1.0)
+    places = np.empty((len(flat), CORNERS, 3))
+    for corner, (a, b) in enumerate(((0, 0), (0, 1), (1, 0), (1, 1))):
+        along = np.stack([i + a, j + b], -1) * (2.0 / cells) - 1.0
+        for ax, others in enumerate(((1, 2), (0, 2), (0, 1))):
+            here = axis == ax
+            places[here, corner, ax] = (side * half)[here]
+            for k, other in enumerate(others):
+                places[here, corner, other] = (along[:, k] * half)[here]
+    vertices, quads = np.unique(places.reshape(-1, 3), axis=0, return_inverse=True)
+    return vertices, quads.reshape(-1, CORNERS), flat
 
 
 def _distance_to(kept: np.ndarray, cells: int) -> np.ndarray:

@@ -14,17 +14,19 @@ from torch import Tensor, nn
 from core.field.frame import as_vec3, empty
 from core.field.network import shade
 from core.field.parameters import Parameters
+from core.field.space import SHELLS, Space
 from core.field.voxels import DENSITY_SCALE, VoxelField
 from core.kernels.adam import adam_vertices, bias_correction
 from core.kernels.launch import accumulator_parts, launch
 from core.kernels.surfaces import VOLUME_KERNELS, Volume, VolumeGradients, sample_volume
 from core.kernels.types import vec8
-from core.mesh.quad_mesh import VERTEX_REACH, QuadMesh, build_mesh
+from core.mesh.quad_mesh import FACES, VERTEX_REACH, QuadMesh, build_mesh, shells_around
 from core.presets import Settings
 from core.training.loss import color_error, pixel_loss
 from core.training.marcher import Marcher, step_grid
 from core.training.pixels import PixelPool
 from core.training.stage import Stage
+from core.training.survey import Survey
 from core.training.tracer import Tracer
 from core.training.voxel_stage import VoxelStage
 
@@ -62,11 +64,12 @@ class FieldStage(Stage):
         self.seen = torch.zeros(len(mesh.quads), dtype=torch.bool, device=device)
         self._pool = pool
         self._tracer = Tracer(mesh, VOLUME_KERNELS, settings.field_batch, 1, HIT_CAPACITY)
-        self._volume = volume_of(nodes, parameters)
+        self._volume = volume_of(mesh.space, nodes, parameters)
         self._touched = torch.zeros(nodes**3, dtype=torch.uint8, device=device)
         parts = accumulator_parts(device)
         self._vertex_grad = torch.zeros(parts, *mesh.vertices.shape, device=device)
         self._vertex_moments = (torch.zeros_like(mesh.vertices), torch.zeros_like(mesh.vertices))
+        self._kernel_space = mesh.space.kernel_space()
         self._centres = torch.from_numpy(mesh.centres()).to(device)
         self._gradients = self._kernel_gradients()
 
@@ -77,21 +80,29 @@ class FieldStage(Stage):
         mesh = _surveyed_mesh(voxels.field, pool, settings.cells, voxels.seed, device)
         density = voxels.field.parameters.scalar.clamp_min(0.0)
         # A quad stands for the matter within about a cell of it.
-        alpha = 1.0 - torch.exp(-density * (DENSITY_SCALE * mesh.cell_size))
+        alpha = 1.0 - torch.exp(-density * (DENSITY_SCALE * mesh.cell_size * mesh.space.inner))
         parameters = Parameters.starting_from(alpha, voxels.field.parameters.features)
         nodes, active = voxels.field.nodes, voxels.field.active
         return cls(pool, mesh, nodes, active, parameters, voxels.network, settings, voxels.seed, device)
 
     @classmethod
     def restored(
-        cls, pool: PixelPool, state: dict[str, Any], network: nn.Sequential, settings: Settings, seed: int, device: str
+        cls,
+        pool: PixelPool,
+        space: Space,
+        state: dict[str, Any],
+        network: nn.Sequential,
+        settings: Settings,
+        seed: int,
+        device: str,
     ) -> "FieldStage":
         nodes, active = state["nodes"], state["active"].to(device)
         n = nodes**3
         parameters = Parameters.starting_from(torch.zeros(n, device=device), torch.zeros(n, 8, device=device))
         parameters.restore_rows(active.long(), state["rows"])
         vertices = state["vertices"].to(device)
-        mesh = QuadMesh(settings.cells, state["kept"].numpy(), vertices, state["quads"].numpy())
+        kept, quads, shell_cells = (state[name].numpy() for name in ("kept", "quads", "shell_cells"))
+        mesh = QuadMesh(settings.cells, kept, vertices, quads, space, shell_cells)
         stage = cls(pool, mesh, nodes, active, parameters, network, settings, seed, device)
         stage.restore(state)
         return stage
@@ -125,8 +136,9 @@ class FieldStage(Stage):
         state = [self.mesh.vertices, *self._vertex_moments, self._centres]
         value, m1, m2, centres = (as_vec3(tensor) for tensor in state)
         grad = as_vec3(self._vertex_grad)
-        inputs = [value, grad, m1, m2, centres, reach, rate, VERTEX_PULL, bias_correction(self.done + 1)]
-        launch(adam_vertices, len(self.mesh.vertices), inputs, self.device)
+        inputs = [self._kernel_space, value, grad, m1, m2, centres, reach, rate, VERTEX_PULL,
+                  bias_correction(self.done + 1)]  # fmt: skip
+        launch(adam_vertices, len(self.mesh.kept), inputs, self.device)
         self._tracer.vertices_moved()
 
     def _kernel_gradients(self) -> VolumeGradients:
@@ -144,6 +156,7 @@ class FieldStage(Stage):
             "rows": self.parameters.rows(self.active.long()),
             "kept": torch.from_numpy(self.mesh.kept),
             "quads": torch.from_numpy(self.mesh.quads),
+            "shell_cells": torch.from_numpy(self.mesh.shell_cells),
             "vertices": self.mesh.vertices,
             "vertex_moments": self._vertex_moments,
             "seen": self.seen,
@@ -155,9 +168,10 @@ class FieldStage(Stage):
         self.seen = state["seen"].to(self.device)
 
 
-def volume_of(nodes: int, parameters: Parameters) -> Volume:
+def volume_of(space: Space, nodes: int, parameters: Parameters) -> Volume:
     """The volume as kernels read it."""
     volume = Volume()
+    volume.space = space.kernel_space()
     volume.nodes = nodes
     volume.alpha = wp.from_torch(parameters.scalar)
     volume.features = wp.from_torch(parameters.features, dtype=vec8)
@@ -174,20 +188,15 @@ def sampled(volume: Volume, points: Tensor, device: str) -> tuple[Tensor, Tensor
 
 def _surveyed_mesh(field: VoxelField, pool: PixelPool, cells: int, seed: int, device: str) -> QuadMesh:
     """The mesh around what random training rays see of the voxel field."""
-    parts, n = accumulator_parts(device), cells**3
-    totals = (
-        torch.zeros(parts, n, device=device),
-        torch.zeros(parts, n, device=device),
-        torch.zeros(parts, n, 3, device=device),
-    )
+    shells = shells_around(field.space, cells)
+    survey = Survey.empty(cells, shells if field.space.kind == SHELLS else -1, device)
     marcher, rng = Marcher(field, device), np.random.default_rng([seed, 2])
     jitter = torch.full((SURVEY_BATCH,), 0.5, device=device)
     for _ in range(SURVEY_RAYS // SURVEY_BATCH):
         batch = pool.draw(rng, SURVEY_BATCH, supersampled=False)
         marcher.forward(batch.origins, batch.directions, jitter)
-        marcher.survey(batch.origins, batch.directions, cells, totals)
-    peak, mass, moment = totals[0].amax(0), totals[1].sum(0), totals[2].sum(0)
+        marcher.survey(batch.origins, batch.directions, survey)
     shape = (cells,) * 3
-    centroid = (moment / mass.clamp_min(1e-9)[:, None]).cpu().numpy()
-    centroid[mass.cpu().numpy() <= 0] = np.nan
-    return build_mesh((peak > SOLID_WEIGHT).cpu().numpy().reshape(shape), centroid.reshape(*shape, 3), device)
+    solid = (survey.peak.amax(0) > SOLID_WEIGHT).cpu().numpy().reshape(shape)
+    seen = (survey.shell_peak.amax(0) > SOLID_WEIGHT).cpu().numpy().reshape(-1, FACES, cells, cells)
+    return build_mesh(solid, survey.centroids().reshape(*shape, 3), device, field.space, seen)

@@ -13,6 +13,7 @@ from core.kernels.adam import adam_grid, bias_correction
 from core.kernels.launch import launch
 from core.kernels.march import Samples, march_backward, march_forward, survey
 from core.kernels.types import vec8
+from core.training.survey import Survey
 
 FIRST_CAPACITY = 48
 
@@ -59,12 +60,13 @@ class Marcher:
         parts = self.field.parameters.parts
         launch(march_backward, len(origins), lambda part: [*shared, part, *outputs], self.device, parts)
 
-    def survey(self, origins: Tensor, directions: Tensor, cells: int, totals: tuple[Tensor, Tensor, Tensor]) -> None:
-        """Adds what the last `forward` saw to totals (peak, mass [parts, cells^3], moment [parts, cells^3, 3])."""
-        peak, mass, moment = totals
-        outputs = [wp.from_torch(peak), wp.from_torch(mass), as_vec3(moment)]
-        shared = [as_vec3(origins), as_vec3(directions), self.samples, cells]
-        launch(survey, len(origins), lambda part: [*shared, part, *outputs], self.device, peak.shape[0])
+    def survey(self, origins: Tensor, directions: Tensor, found: Survey) -> None:
+        """Adds what the last `forward` saw."""
+        outputs = [wp.from_torch(found.peak), wp.from_torch(found.mass), as_vec3(found.moment),
+                   wp.from_torch(found.shell_peak)]  # fmt: skip
+        shared = [as_vec3(origins), as_vec3(directions), self.samples, self._grid.space,
+                  found.cells, found.shells]  # fmt: skip
+        launch(survey, len(origins), lambda part: [*shared, part, *outputs], self.device, found.peak.shape[0])
 
     def adam(self, rates: tuple[float, float], decay: float, bounds: tuple[float, float], steps: int) -> None:
         step_grid(self.field.parameters, self._active, self._touched, rates, decay, bounds, steps, self.device)
@@ -76,6 +78,7 @@ class Marcher:
         self._features, self._alpha = empty(rays, 8, device=self.device), empty(rays, device=self.device)
         samples = Samples()
         samples.t = wp.empty(shape, dtype=float, device=self.device)
+        samples.s = wp.empty(shape, dtype=float, device=self.device)
         samples.alpha = wp.empty(shape, dtype=float, device=self.device)
         samples.transmittance = wp.empty(shape, dtype=float, device=self.device)
         samples.features = wp.empty(shape, dtype=vec8, device=self.device)

@@ -14,6 +14,7 @@ from torch import Tensor, nn
 from core.errors import TrainingFailed
 from core.field.network import shade
 from core.field.parameters import Parameters
+from core.field.space import Space
 from core.kernels.adam import adam_texels
 from core.kernels.launch import launch
 from core.kernels.surfaces import TEXEL_KERNELS, TexelGradients, Texels
@@ -75,7 +76,7 @@ class TexelStage(Stage):
         if not field.seen.any():
             raise TrainingFailed("mesh", "some quad must be seen", "none", "Check the poses and the background.")
         mesh = field.mesh.with_quads(field.seen.cpu().numpy())
-        volume = volume_of(field.nodes, field.parameters)
+        volume = volume_of(mesh.space, field.nodes, field.parameters)
         baked = [sampled(volume, points, field.device) for points in _texel_points(mesh, field.settings.patch)]
         alpha, features = (torch.cat([part[i] for part in baked]) for i in (0, 1))
         parameters = Parameters.starting_from(alpha, features)
@@ -83,9 +84,17 @@ class TexelStage(Stage):
 
     @classmethod
     def restored(
-        cls, pool: PixelPool, state: dict[str, Any], network: nn.Sequential, settings: Settings, seed: int, device: str
+        cls,
+        pool: PixelPool,
+        space: Space,
+        state: dict[str, Any],
+        network: nn.Sequential,
+        settings: Settings,
+        seed: int,
+        device: str,
     ) -> "TexelStage":
-        mesh = QuadMesh(settings.cells, state["kept"].numpy(), state["vertices"].to(device), state["quads"].numpy())
+        kept, quads, shell_cells = (state[name].numpy() for name in ("kept", "quads", "shell_cells"))
+        mesh = QuadMesh(settings.cells, kept, state["vertices"].to(device), quads, space, shell_cells)
         n = len(state["rows"]["scalar"])
         parameters = Parameters.starting_from(torch.zeros(n, device=device), torch.zeros(n, 8, device=device))
         parameters.restore_rows(torch.arange(n, device=device), state["rows"])
@@ -138,6 +147,7 @@ class TexelStage(Stage):
             "updates": self._updates,
             "kept": torch.from_numpy(self.mesh.kept),
             "quads": torch.from_numpy(self.mesh.quads),
+            "shell_cells": torch.from_numpy(self.mesh.shell_cells),
             "vertices": self.mesh.vertices,
         }
 

@@ -61,7 +61,7 @@ class VoxelStage(Stage):
         super().__init__(network, settings, settings.voxel_steps, seed, device)
         self.capture, self.region = capture, region
         self._levels = levels_of(settings)
-        self._enter(VoxelField.new(self._levels[0].nodes, region.hull, seed, device))
+        self._enter(VoxelField.new(region.space, self._levels[0].nodes, region.hull, seed, device))
 
     def _enter(self, field: VoxelField) -> None:
         self.field, self.marcher = field, Marcher(field, self.device)
@@ -86,7 +86,7 @@ class VoxelStage(Stage):
         F, A = self.marcher.forward(batch.origins, batch.directions, jitter)
         F.requires_grad_()
         A.requires_grad_()
-        color = shade(self.network, F, A, batch.directions)
+        color = shade(self.network, F, A, batch.centre_directions)
         loss = pixel_loss(color, A, batch.color, batch.alpha, self.settings.coverage)
         falling = FINAL_RATE**self.fraction
         self.optimize_network(loss, NETWORK_RATE * falling)
@@ -113,7 +113,7 @@ class VoxelStage(Stage):
         }
 
     def restore_own(self, state: dict[str, Any]) -> None:
-        field = VoxelField.new(state["nodes"], self.region.hull, self.seed, self.device)
+        field = VoxelField.new(self.region.space, state["nodes"], self.region.hull, self.seed, self.device)
         field.parameters.scalar.fill_(EMPTY_DENSITY)
         field.occupied, field.active = state["occupied"].to(self.device), state["active"].to(self.device)
         field.parameters.restore_rows(field.active.long(), state["rows"])

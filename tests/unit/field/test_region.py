@@ -10,6 +10,7 @@ from core.capture import Capture, View
 from core.errors import CaptureEmpty
 from core.field.frame import Frame
 from core.field.region import REACH_WITHOUT_ALPHA, Region, find_region, visual_hull
+from core.scene_kind import OBJECT, SceneKind
 from tests.unit.training.captures import ball, capture_of, ring_cameras
 
 
@@ -45,7 +46,7 @@ def photos_of_points(points: np.ndarray, cameras: list[Camera]) -> list[View]:
 
 def cells_of(points: np.ndarray, frame: Frame, cells: int) -> np.ndarray:
     """[cells]^3 bool: cells that hold a point."""
-    place = np.floor((frame.to_cube(points) + 1) * cells / 2).astype(int)
+    place = np.floor((frame.to_scene(points) + 1) * cells / 2).astype(int)
     held = np.zeros((cells,) * 3, bool)
     held[tuple(place.T)] = True
     return held
@@ -104,8 +105,8 @@ def test_the_hull_keeps_points_anywhere_for_cameras_with_wide_lenses(rng):
         assert hull[cells_of(point[None], frame, 32)].all()
 
 
-def test_without_an_alpha_channel_the_region_is_around_the_point_looked_at():
-    capture = capture_of(ball(), alpha=False)
+def test_an_object_without_an_alpha_channel_is_around_the_point_looked_at():
+    capture = replace(capture_of(ball(), alpha=False), kind=SceneKind(OBJECT, "chosen", overridden=True))
     region = find_region(capture)
     np.testing.assert_allclose(region.frame.centre, 0.0, atol=1e-3)
     assert region.frame.half == pytest.approx(4.0 * REACH_WITHOUT_ALPHA, rel=1e-3)
@@ -145,5 +146,5 @@ def test_parallel_cameras_do_not_break_the_search():
 def test_frames_map_there_and_back(rng):
     frame = Frame(np.array([3.0, -2.0, 7.0]), 0.25)
     points = rng.normal(size=(20, 3))
-    np.testing.assert_allclose(frame.to_object(frame.to_cube(points)), points, atol=1e-12)
+    np.testing.assert_allclose(frame.to_object(frame.to_scene(points)), points, atol=1e-12)
     np.testing.assert_allclose(frame.to_object(np.array([1.0, -1.0, 0.0])), [3.25, -2.25, 7.0])

@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from core.field.parameters import Parameters
+from core.field.space import Space
 from core.field.voxels import EMPTY_DENSITY, VoxelField, _active_nodes
 from core.oracles.grid import trilinear
 from core.presets import PRESETS
@@ -46,7 +47,7 @@ def test_exactly_the_nodes_that_samples_in_occupied_cells_read_train(rng, nodes,
 
 
 def field_with(density: np.ndarray, occupied=EVERYTHING) -> VoxelField:
-    field = VoxelField.new(len(density), occupied, 0, "cpu")
+    field = VoxelField.new(Space.cube(), len(density), occupied, 0, "cpu")
     field.parameters.scalar.copy_(torch.from_numpy(density.astype(np.float32)).reshape(-1))
     return field
 
@@ -99,13 +100,15 @@ def test_nothing_outside_the_hull_is_occupied_and_nothing_inside_is_lost(rng, ce
 
 
 def test_a_new_field_depends_on_its_seed_alone():
-    one, same, other = (VoxelField.new(8, EVERYTHING, seed, "cpu").parameters.features for seed in (1, 1, 2))
+    one, same, other = (
+        VoxelField.new(Space.cube(), 8, EVERYTHING, seed, "cpu").parameters.features for seed in (1, 1, 2)
+    )
     assert torch.equal(one, same)
     assert not torch.equal(one, other)
 
 
 def test_no_ray_in_the_cube_needs_more_samples_than_stated():
-    field = VoxelField.new(20, EVERYTHING, 0, "cpu")
+    field = VoxelField.new(Space.cube(), 20, EVERYTHING, 0, "cpu")
     assert (field.max_samples() - 1) * field.step > 2 * np.sqrt(3)
 
 

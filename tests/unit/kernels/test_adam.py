@@ -7,6 +7,7 @@ import warp as wp
 
 from core.field.frame import as_vec3
 from core.field.parameters import Parameters
+from core.field.space import Space
 from core.kernels.adam import BETA1, BETA2, adam_texels, adam_vertices, bias_correction
 from core.kernels.launch import accumulator_parts, launch
 from core.oracles.adam import LazyAdam
@@ -180,7 +181,8 @@ class VertexSteps:
     def step(self, rate: float, pull: float = 0.0) -> None:
         self.steps += 1
         arrays = [as_vec3(t) for t in (self.value, self.grad, *self.moments, self.centres)]
-        launch(adam_vertices, N, [*arrays, self.REACH, rate, pull, bias_correction(self.steps)], self.device)
+        space = Space.cube().kernel_space()
+        launch(adam_vertices, N, [space, *arrays, self.REACH, rate, pull, bias_correction(self.steps)], self.device)
 
 
 def test_vertex_steps_agree_and_leave_vertices_without_gradient(rng, device):

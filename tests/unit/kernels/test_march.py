@@ -5,11 +5,13 @@ import pytest
 import torch
 
 from core.field.parameters import Parameters
+from core.field.space import Space
 from core.field.voxels import DENSITY_SCALE, EMPTY_DENSITY, VoxelField
 from core.kernels import march as kernel
 from core.oracles import march as oracle
 from core.training import marcher as marching
 from core.training.marcher import Marcher
+from core.training.survey import Survey
 from tests.unit.kernels.rays import as_float32, axis_rays, inside_rays, joined, plane_rays, random_rays
 
 # float32 adds up distances and products of order 1 over 60 samples: 60 x 6e-8, times the field's slope of about 10.
@@ -23,7 +25,7 @@ def field_of(density: np.ndarray, features: np.ndarray, occupied: np.ndarray, de
     scalar, colours = (torch.from_numpy(a.astype(np.float32)).to(device) for a in (density, features))
     parameters = Parameters.starting_from(scalar.reshape(-1), colours.reshape(-1, 8))
     active = torch.arange(n**3, dtype=torch.int32, device=device)
-    return VoxelField(n, parameters, torch.from_numpy(occupied).to(device), active)
+    return VoxelField(Space.cube(), n, parameters, torch.from_numpy(occupied).to(device), active)
 
 
 def mixed_field(rng: np.random.Generator, device: str = "cpu", *, nodes: int = NODES) -> VoxelField:
@@ -191,9 +193,8 @@ def test_survey_adds_up_what_rays_see_in_each_cell(rng, device):
     field, rays, cells = mixed_field(rng, device), awkward_rays(rng), 6
     jitter = np.full(len(rays[0]), 0.5, np.float32)
     marcher, *_ = marched(field, rays, jitter)
-    parts, n = field.parameters.parts, cells**3
-    totals = tuple(torch.zeros(parts, n, *tail, device=device) for tail in ((), (), (3,)))
-    marcher.survey(*on_device(field, *rays), cells, totals)
+    n, survey = cells**3, Survey.empty(cells, -1, device)
+    marcher.survey(*on_device(field, *rays), survey)
     _, _, expected = exact_rays(field, rays, jitter)
     peak, mass, moment = torch.zeros(n), torch.zeros(n), torch.zeros(n, 3)
     for ray, o, d in zip(expected, *(torch.from_numpy(a) for a in rays), strict=True):
@@ -205,6 +206,6 @@ def test_survey_adds_up_what_rays_see_in_each_cell(rng, device):
                 peak[cell], mass[cell] = max(float(peak[cell]), w), mass[cell] + w
                 moment[cell] += w * p
     # A sample within rounding of a cell's face or of the threshold may count elsewhere: at most a few of thousands.
-    found = totals[0].amax(0), totals[1].sum(0), totals[2].sum(0)
+    found = survey.peak.amax(0), survey.mass.sum(0), survey.moment.sum(0)
     for actual, wanted in zip(found, (peak, mass, moment), strict=True):
         assert ((actual.cpu() - wanted).abs() > 1e-3).float().mean() < 0.02

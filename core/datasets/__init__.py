@@ -5,35 +5,44 @@ from __future__ import annotations
 from pathlib import Path
 
 from core.capture import WHITE, Capture
+from core.datasets.colmap import list_colmap
 from core.datasets.decode import decoded
-from core.datasets.detect import find_pose_file
+from core.datasets.detect import find_source, photos_without_poses
 from core.datasets.listing import Listing
-from core.datasets.nerf_synthetic import TRAIN_FILE, list_nerf_synthetic
+from core.datasets.llff import list_llff
+from core.datasets.nerf_synthetic import list_nerf_synthetic
 from core.datasets.nerfstudio import list_nerfstudio
-from core.errors import OptionInvalid
+from core.datasets.photo_folders import NO_REDUCTION, Reduction
 from core.normalisation import normalised
 from core.scene_kind import AUTO, chosen_kind
 
-__all__ = ["Listing", "check_capture", "read_capture"]
+__all__ = ["Listing", "check_capture", "photos_without_poses", "read_capture"]
 
 
-def check_capture(path: Path, *, skip_missing: bool = False) -> Listing:
+def check_capture(path: Path, *, skip_missing: bool = False, reduction: Reduction = NO_REDUCTION) -> Listing:
     """Everything that can be checked without decoding a pixel: poses, existence and headers of the photos.
 
     Args:
-        path: a folder with photos and `transforms_train.json` (NeRF-synthetic) or `transforms.json` (nerfstudio,
-            instant-ngp), or one that wraps such a folder, or the pose file itself.
-        skip_missing: leave out photos that the pose file names but the capture lacks (instant-ngp does), with a note,
+        path: a folder with photos and their poses (NeRF-synthetic, nerfstudio, COLMAP or LLFF), one that wraps such a
+            folder, the pose file itself, or the folder of photos (images_8) of a COLMAP or LLFF capture.
+        skip_missing: leave out photos that the poses name but the capture lacks (instant-ngp does), with a note,
             instead of refusing the capture.
+        reduction: the size that the photos are wanted in. COLMAP and LLFF captures may have smaller copies of their
+            photos, of which the fitting one is taken.
 
     Raises:
         CaptureNotFound, NoImages, PosesMissing, PosesInvalid, PoseNotFinite, PoseNotRigid, ImageMissing,
         ImageUndecodable, ImageTooLarge, ImageSizeMismatch, TooFewImages
     """
-    pose_path = find_pose_file(Path(path))
-    if pose_path.name == TRAIN_FILE:
-        return list_nerf_synthetic(pose_path.parent, skip_missing=skip_missing)
-    return list_nerfstudio(pose_path, skip_missing=skip_missing)
+    source = find_source(Path(path))
+    if source.is_nerf_synthetic:
+        return list_nerf_synthetic(source.root, skip_missing=skip_missing)
+    if source.is_colmap:
+        models = list(source.pose_paths)
+        return list_colmap(models, source.root, reduction, source.photo_folder, skip_missing=skip_missing)
+    if source.is_llff:
+        return list_llff(source.pose_paths[0], reduction, source.photo_folder)
+    return list_nerfstudio(source.pose_paths[0], skip_missing=skip_missing)
 
 
 def read_capture(
@@ -50,21 +59,17 @@ def read_capture(
     Args:
         path, skip_missing: as for `check_capture`, which runs first.
         max_size_px: longest side of a photo at most.
-        downscale: sides are divided by it, >= 1. Of both limits the stricter one holds.
+        downscale: sides are divided by it, >= 1. Of both limits the stricter one holds. It is relative to the photos in
+            full size, unless `path` names a folder of smaller ones.
         background: sRGB in [0, 1], behind transparent pixels.
         kind: of scene: "auto" (detected), "object", "forward" or "unbounded".
 
     Raises:
         what `check_capture` raises, and ImageUndecodable, CaptureEmpty, OptionInvalid
     """
-    if downscale < 1 or (max_size_px is not None and max_size_px < 1):
-        raise OptionInvalid(
-            "photo size",
-            "downscale and max_size_px must be at least 1",
-            f"{downscale} and {max_size_px}",
-            "Leave them out.",
-        )
     scene_kind = chosen_kind(kind)
-    listing = check_capture(path, skip_missing=skip_missing)
-    train, test = decoded(listing, max_size_px=max_size_px, downscale=downscale)
-    return normalised(Capture(train, test, background, notes=listing.notes, kind=scene_kind))
+    reduction = Reduction(downscale, max_size_px)
+    listing = check_capture(path, skip_missing=skip_missing, reduction=reduction)
+    train, test = decoded(listing, reduction)
+    capture = Capture(train, test, background, notes=listing.notes, points=listing.points, kind=scene_kind)
+    return normalised(capture, up_known=listing.up_known)

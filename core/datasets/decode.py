@@ -9,6 +9,8 @@ import numpy as np
 
 from core.capture import View
 from core.datasets.listing import Listing, Photo
+from core.datasets.masks import read_mask
+from core.datasets.photo_folders import NO_REDUCTION, Reduction
 from core.datasets.undistortion import undistorted
 from core.errors import ImageTooLarge
 from core.images import area_resized, downscaled_size, read_image
@@ -20,19 +22,13 @@ THREADS = 2
 MAX_TOTAL_PIXELS = 1_000_000_000
 
 
-def decoded(
-    listing: Listing, *, max_size_px: int | None = None, downscale: float = 1
-) -> tuple[tuple[View, ...], tuple[View, ...]]:
-    """(train, test) views of a listing.
-
-    Args:
-        max_size_px: longest side at most, or None.
-        downscale: sides are divided by it, >= 1. Of both limits the stricter one holds.
+def decoded(listing: Listing, reduction: Reduction = NO_REDUCTION) -> tuple[tuple[View, ...], tuple[View, ...]]:
+    """(train, test) views of a listing, in the frame of its poses.
 
     Raises:
-        ImageUndecodable, ImageTooLarge
+        ImageUndecodable, ImageTooLarge, ImageSizeMismatch
     """
-    sizes = [target_size(photo.camera.size_px, max_size_px, downscale) for photo in listing.photos]
+    sizes = [target_size(photo, reduction) for photo in listing.photos]
     _check_total(sizes)
     with ThreadPoolExecutor(THREADS) as threads:
         futures = [threads.submit(_view, photo, size) for photo, size in zip(listing.photos, sizes, strict=True)]
@@ -45,15 +41,16 @@ def decoded(
     return tuple(views[: len(listing.train)]), tuple(views[len(listing.train) :])
 
 
-def target_size(size_px: tuple[int, int], max_size_px: int | None, downscale: float) -> tuple[int, int]:
-    """(width, height) after both limits."""
-    factor = max(float(downscale), max(size_px) / max_size_px if max_size_px else 1.0)
-    return downscaled_size(size_px, factor)
+def target_size(photo: Photo, reduction: Reduction) -> tuple[int, int]:
+    """(width, height) that a photo is reduced to; a copy that is small already counts as reduced."""
+    size_px = photo.camera.size_px
+    return downscaled_size(size_px, reduction.factor(size_px, photo.scale))
 
 
 def _view(photo: Photo, size_px: tuple[int, int]) -> View:
-    image = undistorted(read_image(photo.path, photo.name), photo.lens)
-    return View(photo.camera.resized(size_px), area_resized(image, size_px))
+    image = area_resized(undistorted(read_image(photo.path, photo.name), photo.lens), size_px)
+    ignored = read_mask(photo.mask_path, photo.name, photo.lens, size_px) if photo.mask_path else None
+    return View(photo.camera.resized(size_px), image, ignored, photo.depth_range)
 
 
 def _without_idle_alpha(views: list[View]) -> list[View]:

@@ -10,6 +10,7 @@ from core.datasets.posefile import PoseFile
 from core.errors import ImageSizeMismatch, PosesInvalid
 
 PINHOLE_LIKE = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "RADIAL", "SIMPLE_RADIAL", "PERSPECTIVE")
+FISHEYE_LIKE = ("OPENCV_FISHEYE",)
 KEYS = (
     "fl_x", "fl_y", "cx", "cy", "w", "h", "camera_angle_x", "camera_angle_y", "camera_model", "is_fisheye",
     "k1", "k2", "k3", "k4", "p1", "p2",
@@ -27,11 +28,11 @@ def lens_of(shared: PoseFile, frame: PoseFile, size_px: tuple[int, int], photo: 
         photo: its name, for messages.
 
     Raises:
-        PosesInvalid: no focal length, wrong types, or a fisheye lens.
+        PosesInvalid: no focal length, wrong types, or a lens of another kind.
         ImageSizeMismatch: the photo has not the stated w and h.
     """
     merged = PoseFile(frame.name, {key: frame.fields.get(key, shared.fields.get(key)) for key in KEYS})
-    _check_model(merged)
+    fisheye = _is_fisheye(merged)
     _check_size(merged, size_px, photo)
     focal_x = merged.number("fl_x") or _focal_from_angle(merged, "camera_angle_x", size_px[0])
     focal_y = merged.number("fl_y") or _focal_from_angle(merged, "camera_angle_y", size_px[1])
@@ -40,8 +41,10 @@ def lens_of(shared: PoseFile, frame: PoseFile, size_px: tuple[int, int], photo: 
         raise merged.invalid('needs "fl_x" or "camera_angle_x", positive', focal_x)
     centre_x, centre_y = merged.number("cx"), merged.number("cy")
     centre = (size_px[0] / 2 if centre_x is None else centre_x, size_px[1] / 2 if centre_y is None else centre_y)
-    coefficients = {key: merged.number(key) or 0.0 for key in ("k1", "k2", "k3", "k4", "p1", "p2")}
-    return Lens((focal_x, focal_y), centre, size_px, Distortion(**coefficients))
+    # OpenCV's fisheye module has no tangential terms; files that state some mean another model's.
+    keys = ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "k3", "k4", "p1", "p2")
+    coefficients = {key: merged.number(key) or 0.0 for key in keys}
+    return Lens((focal_x, focal_y), centre, size_px, Distortion(**coefficients, fisheye=fisheye))
 
 
 def _focal_from_angle(fields: PoseFile, key: str, size_px: int) -> float | None:
@@ -53,17 +56,16 @@ def _focal_from_angle(fields: PoseFile, key: str, size_px: int) -> float | None:
     return 0.5 * size_px / math.tan(0.5 * angle)
 
 
-def _check_model(fields: PoseFile) -> None:
+def _is_fisheye(fields: PoseFile) -> bool:
     model = (fields.text("camera_model") or "PINHOLE").upper()
-    if fields.fields.get("is_fisheye"):
-        model = "is_fisheye"
-    if model not in PINHOLE_LIKE:
+    if model not in (*PINHOLE_LIKE, *FISHEYE_LIKE):
         raise PosesInvalid(
             fields.name,
-            f"the camera model must be one of {', '.join(PINHOLE_LIKE)}",
-            f"{model[:40]}; fisheye and panorama lenses are not supported",
+            f"the camera model must be one of {', '.join((*PINHOLE_LIKE, *FISHEYE_LIKE))}",
+            f"{model[:40]}; panoramas are not supported",
             "Undistort the photos to a pinhole camera first (COLMAP's image_undistorter does), and pose those.",
         )
+    return model in FISHEYE_LIKE or bool(fields.fields.get("is_fisheye"))
 
 
 def _check_size(fields: PoseFile, size_px: tuple[int, int], photo: str) -> None:

@@ -12,8 +12,10 @@ from core.errors import PosesInvalid
 
 BORDER_SAMPLES = 129
 FOLD_SAMPLES = 65
-# A pinhole photo of a wide lens grows without bound; beyond this a fisheye model would be needed anyway.
+# A pinhole photo of a wide lens grows without bound.
 MAX_GROWTH = 4.0
+# What a fisheye lens sees further out than 55 degrees (across or up) is cut off: a pinhole would spread it too thinly.
+FISHEYE_REACH = float(np.tan(np.radians(55.0)))
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,8 @@ def inner_frame(lens: Lens) -> tuple[int, int, int, int]:
     with np.errstate(all="ignore"):
         points = np.stack([np.stack(edge, -1) for edge in edges])
         pinhole = lens.pixels(lens.distortion.undistort(lens.normalised(points)))
+    if lens.distortion.fisheye:
+        pinhole = _within_reach(lens, pinhole)
     if not np.isfinite(pinhole).all():
         raise _not_invertible(lens, "a photo edge that no straight ray reaches")
     bounds = [pinhole[0, :, 0].max(), pinhole[1, :, 1].max(), pinhole[2, :, 0].min(), pinhole[3, :, 1].min()]
@@ -71,6 +75,22 @@ def inner_frame(lens: Lens) -> tuple[int, int, int, int]:
     if (np.linalg.det(lens.distortion.jacobian(lens.normalised(grid))) <= 0).any():
         raise _not_invertible(lens, "a photo folded over itself")
     return left, top, right, bottom
+
+
+def _within_reach(lens: Lens, edges: np.ndarray) -> np.ndarray:
+    """Undistorted edges [left, top, right, bottom][samples][x, y], pulled in to what is kept of a fisheye photo.
+
+    Parts of an edge that are 90 degrees and more off the axis have no pinhole point (NaN), and bound nothing.
+    """
+    low = lens.pixels(np.full(2, -FISHEYE_REACH))
+    high = lens.pixels(np.full(2, FISHEYE_REACH))
+    edges = edges.copy()
+    for side, limit in enumerate((low, low, high, high)):
+        across = side % 2
+        values = np.where(np.isfinite(edges[side, :, across]), edges[side, :, across], limit[across])
+        edges[side, :, across] = np.maximum(values, limit[across]) if side < 2 else np.minimum(values, limit[across])
+        edges[side, :, 1 - across] = 0.0  # not a bound of this side
+    return edges
 
 
 def _not_invertible(lens: Lens, received: str) -> PosesInvalid:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+import numpy as np
+
 from core.camera import Camera
 from core.capture import MIN_TRAIN_IMAGES
 from core.datasets.lens import Lens
@@ -22,6 +24,9 @@ class Photo:
         stated_path: what the pose file calls it.
         camera: of the undistorted photo at full size.
         lens: of the photo as it is stored.
+        mask_path: a picture whose black takes pixels out of training and measuring.
+        depth_range: (near, far) in the camera's units.
+        scale: how many times smaller the stored photo is than what "full size" means to the user.
     """
 
     path: Path
@@ -29,11 +34,18 @@ class Photo:
     stated_path: PurePosixPath
     camera: Camera
     lens: Lens
+    mask_path: Path | None = None
+    depth_range: tuple[float, float] | None = None
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)
 class Listing:
     """Photos to learn from, photos held out, and remarks for the user.
+
+    Attributes:
+        points: [n, 3] float64, sparse points in the frame of the poses, or None.
+        up_known: the poses' frame has +z up by convention.
 
     Raises:
         TooFewImages
@@ -42,6 +54,8 @@ class Listing:
     train: tuple[Photo, ...]
     test: tuple[Photo, ...]
     notes: tuple[str, ...] = ()
+    points: np.ndarray | None = None
+    up_known: bool = True
 
     def __post_init__(self) -> None:
         if len(self.train) < MIN_TRAIN_IMAGES:
@@ -66,3 +80,9 @@ def held_out(photos: list[Photo]) -> tuple[tuple[Photo, ...], tuple[Photo, ...]]
     test = tuple(photos[::HOLD_OUT_EVERY])
     train = tuple(photo for index, photo in enumerate(photos) if index % HOLD_OUT_EVERY)
     return train, test
+
+
+def mask_notes(photos: list[Photo]) -> tuple[str, ...]:
+    """A remark on masks, if there are any."""
+    count = sum(photo.mask_path is not None for photo in photos)
+    return (f"Masks of {count} of {len(photos)} photos are used: what they show black is left out.",) if count else ()

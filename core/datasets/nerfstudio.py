@@ -1,15 +1,15 @@
 """instant-ngp and nerfstudio captures: transforms.json with intrinsics and OpenCV distortion, shared or per frame.
 
 Poses are camera-to-world with OpenGL axes, as ours. A split that the file states (`train_filenames`, `test_filenames`
-or `val_filenames`) is used. `aabb_scale` and `applied_transform` do not matter: the capture keeps its own frame. Masks
-and depth maps are not read.
+or `val_filenames`) is used. `aabb_scale` and `applied_transform` do not matter: the capture is normalised. Masks are
+read (`mask_path`, or a folder `masks`), depth maps are not.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from core.datasets.listing import Listing, Photo, held_out
+from core.datasets.listing import Listing, Photo, held_out, mask_notes
 from core.datasets.photo_paths import PhotoFinder, relative_photo_path
 from core.datasets.posed_photos import posed_photos
 from core.datasets.posefile import PoseFile, read_pose_file
@@ -27,9 +27,7 @@ def list_nerfstudio(pose_path: Path, *, skip_missing: bool = False) -> Listing:
     finder = PhotoFinder(pose_path.parent)
     photos = posed_photos(poses, finder)
     notes = finder.left_out() if skip_missing else finder.check_none_missing()
-    if any("mask_path" in frame.fields for frame in poses.frames()):
-        notes += ("Masks are not read; cut the object out into the photos' alpha channel instead.",)
-    return Listing(*_stated_split(poses, photos) or held_out(photos), notes)
+    return Listing(*_stated_split(poses, photos) or held_out(photos), notes + mask_notes(photos))
 
 
 def _stated_split(poses: PoseFile, photos: list[Photo]) -> tuple[tuple[Photo, ...], tuple[Photo, ...]] | None:

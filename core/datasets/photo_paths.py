@@ -50,7 +50,7 @@ class PhotoFinder:
                 "capture",
                 "must contain every photo that its pose file names",
                 f"{len(self.missing)} missing: {self._named()}",
-                "Add these photos, or remove their frames from the pose file.",
+                "Add these photos, or leave them out: --skip-missing (API: skip_missing=true).",
             )
         return ()
 

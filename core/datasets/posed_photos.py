@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+
+import numpy as np
 
 from core.camera import Camera
 from core.datasets.intrinsics import lens_of
+from core.datasets.lens import Lens
 from core.datasets.listing import Photo
+from core.datasets.masks import FOLDER, find_mask
 from core.datasets.photo_paths import PhotoFinder, relative_photo_path
 from core.datasets.posefile import PoseFile
+from core.errors import ImageMissing
 from core.images import read_size
 
 
@@ -48,6 +53,33 @@ def _camera(frame: PoseFile, file_path: str) -> Camera:
 def _photo(poses: PoseFile, frame: PoseFile, file_path: str, path: Path, folder: Path) -> Photo:
     name = path.relative_to(folder).as_posix()
     lens = lens_of(poses, frame, read_size(path, name), name)
+    stated_path = relative_photo_path(file_path)
+    mask_path = _mask(frame, stated_path, folder)
+    return Photo(path, name, stated_path, pinhole_camera(path.stem, frame.matrix(), lens), lens, mask_path)
+
+
+def pinhole_camera(name: str, world_from_camera: np.ndarray, lens: Lens) -> Camera:
+    """The camera of a photo once it is undistorted.
+
+    Raises:
+        PosesInvalid, PoseNotFinite, PoseNotRigid
+    """
     pinhole = lens.pinhole
-    camera = Camera(path.stem, frame.matrix(), pinhole.focal_px, pinhole.centre_px, pinhole.size_px)
-    return Photo(path, name, relative_photo_path(file_path), camera, lens)
+    return Camera(name, world_from_camera, pinhole.focal_px, pinhole.centre_px, pinhole.size_px)
+
+
+def _mask(frame: PoseFile, photo: PurePosixPath, folder: Path) -> Path | None:
+    """The mask that the frame names, else the one that lies in masks/."""
+    stated = frame.text("mask_path")
+    if stated is None:
+        return find_mask(folder / FOLDER, PurePosixPath(*photo.parts[1:]) if len(photo.parts) > 1 else photo)
+    relative = relative_photo_path(stated)
+    path = next((path for path in (folder / relative, folder / relative.name) if path.is_file()), None)
+    if path is None:
+        raise ImageMissing(
+            f"mask of {photo}",
+            "must be there, since the pose file names it",
+            f"no {stated[:80]}",
+            'Add the mask, or remove "mask_path" from the pose file.',
+        )
+    return path

@@ -31,6 +31,18 @@ def undistorted(image_u8: np.ndarray, lens: Lens) -> np.ndarray:
     return result
 
 
+def seen_pixels(lens: Lens) -> np.ndarray:
+    """[4, h, w] int32: the flat indices of the photo's pixels that each pixel of the undistorted photo is mixed of.
+
+    A pixel whose share is zero counts as one of the others.
+    """
+    index, share_x, share_y = _lookup(lens)
+    width, height = lens.size_px
+    right = np.minimum((share_x > 0).astype(np.int32), width - 1 - index % width)
+    down = np.minimum((share_y > 0).astype(np.int32), height - 1 - index // width) * width
+    return np.stack([index, index + right, index + down, index + right + down])
+
+
 @lru_cache(maxsize=4)
 def _lookup(lens: Lens) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Per pinhole pixel [h, w]: flat index (int32) of the upper left of four photo pixels, and the shares (float32)."""

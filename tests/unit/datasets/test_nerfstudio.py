@@ -99,9 +99,7 @@ def test_photo_of_another_size_than_stated_is_refused(tmp_path):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"camera_model": "OPENCV_FISHEYE"},
         {"camera_model": "EQUIRECTANGULAR"},
-        {"is_fisheye": True},
         {"camera_model": 3},
         {"fl_x": "10"},
         {"fl_x": -3},

@@ -40,7 +40,7 @@ def list_llff(pose_path: Path, reduction: Reduction, photo_folder: Path | None =
     rows = _read_rows(pose_path)
     root = pose_path.parent
     full_size = _size(rows[0, :15].reshape(3, 5))
-    folder = PhotoFolder(photo_folder) if photo_folder else chosen_folder(root, full_size, reduction, photos_in)
+    folder = PhotoFolder(photo_folder) if photo_folder else chosen_folder(root, full_size, reduction, _has_photos)
     paths = photos_in(folder.path)
     if not paths:
         raise NoImages("capture", f"must have photos beside {POSE_FILE}, or in images", "none", "Add the photos.")
@@ -54,6 +54,10 @@ def list_llff(pose_path: Path, reduction: Reduction, photo_folder: Path | None =
     photos = [_photo(row, path, folder, root) for row, path in zip(rows, paths, strict=True)]
     notes = () if folder.path.name in ("images", root.name) else (f"Photos are taken from {folder.path.name}.",)
     return Listing(*held_out(photos), notes + mask_notes(photos), up_known=False)
+
+
+def _has_photos(folder: Path) -> bool:
+    return bool(photos_in(folder))
 
 
 def _read_rows(path: Path) -> np.ndarray:

@@ -116,8 +116,8 @@ class BakedScene:
 
     def __post_init__(self) -> None:
         _require(len(self.pages) > 0, "scene", "must have at least one page", "none")
-        _check_similarity("asset_from_object", self.asset_from_object)
-        _check_similarity("user_from_object", self.user_from_object)
+        check_similarity("asset_from_object", self.asset_from_object)
+        check_similarity("user_from_object", self.user_from_object)
         start = self.start_camera
         among = start is None or (type(start) is int and 0 <= start < len(self.cameras))
         _require(among, "start_camera", f"must be one of the {len(self.cameras)} cameras", str(start)[:20])
@@ -145,7 +145,8 @@ def similarity_scale(matrix: np.ndarray) -> float:
         return float(np.median(np.linalg.norm(np.asarray(matrix, np.float64)[:3, :3], axis=0)))
 
 
-def _check_similarity(subject: str, matrix: np.ndarray) -> None:
+def check_similarity(subject: str, matrix: np.ndarray) -> None:
+    """Raises SceneInvalid unless `matrix` is a finite [4, 4] rotation, translation and one positive scale."""
     ok = np.shape(matrix) == (4, 4) and bool(np.isfinite(matrix).all())
     _require(ok, subject, "must be a finite 4x4 matrix", str(np.shape(matrix)))
     scale = similarity_scale(matrix)

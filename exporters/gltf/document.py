@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from exporters.gltf.invalid import invalid
+from exporters.invalid import invalid
 
 _MAGIC = 0x46546C67  # "glTF"
 _JSON = 0x4E4F534A

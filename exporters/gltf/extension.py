@@ -8,8 +8,8 @@ import numpy as np
 from core.baked import ShaderNetwork
 from core.camera import Camera
 from exporters.glsl import PROGRAMS, VERSIONS, Program, ShaderSources, shader_sources
-from exporters.gltf.invalid import invalid
-from exporters.gltf.numbers import column_major, matrix_from_column_major, numbers, shortest_numbers
+from exporters.invalid import invalid
+from exporters.numbers import column_major, matrix_from_column_major, numbers, shortest_numbers
 
 NAME = "POLYFIELD_materials_neural"
 CODING = "unorm8"

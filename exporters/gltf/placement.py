@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from core.baked import similarity_scale
-from exporters.gltf.invalid import invalid
-from exporters.gltf.numbers import matrix_from_column_major, numbers
+from exporters.invalid import invalid
+from exporters.numbers import matrix_from_column_major, numbers
 
 SAME_SCALE = 1e-6  # relative difference of a node's three scales that counts as rounding
 

@@ -1,7 +1,5 @@
 """A .glb with POLYFIELD_materials_neural, back as the baked scene it was written from."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -9,15 +7,15 @@ import numpy as np
 from core.baked import BakedScene, Page
 from core.camera import Camera
 from core.conventions import is_opaque
-from core.errors import AssetInvalid, PolyfieldError
+from core.errors import AssetInvalid
 from exporters.glsl import ShaderSources
 from exporters.gltf import extension
 from exporters.gltf.document import Document
-from exporters.gltf.invalid import invalid
-from exporters.gltf.limits import check_size
-from exporters.gltf.numbers import matrix_from_column_major, numbers
 from exporters.gltf.placement import node_matrix
-from exporters.gltf.png import decode_pngs, png_size
+from exporters.invalid import invalid, only_asset_invalid
+from exporters.limits import check_size
+from exporters.numbers import matrix_from_column_major, numbers
+from exporters.png import decode_pngs, png_size
 
 _FLOAT = (5126,)
 _INDEX = (5121, 5123, 5125)
@@ -30,7 +28,7 @@ def read_glb(data: bytes) -> BakedScene:
     Raises:
         AssetInvalid: damaged, or not a file of this kind. Nothing else, whatever the bytes.
     """
-    with _only_asset_invalid():
+    with only_asset_invalid(extension.NAME):
         document = Document(data)
         root = _root_extension(document)
         return BakedScene(
@@ -50,21 +48,8 @@ def read_shaders(data: bytes) -> dict[str, ShaderSources]:
     Raises:
         AssetInvalid
     """
-    with _only_asset_invalid():
+    with only_asset_invalid(extension.NAME):
         return extension.shaders_from_json(_network(_root_extension(Document(data))))
-
-
-@contextmanager
-def _only_asset_invalid() -> Iterator[None]:
-    """Turns what JSON of an unexpected structure leads to, and the scene's own rules, into AssetInvalid."""
-    try:
-        yield
-    except AssetInvalid:
-        raise
-    except PolyfieldError as error:
-        raise invalid(error.subject, error.rule, error.received) from error
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
-        raise invalid(extension.NAME, "must follow its schema", f"{type(error).__name__}: {error}"[:120]) from error
 
 
 def _root_extension(document: Document) -> dict[str, Any]:

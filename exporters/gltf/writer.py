@@ -11,10 +11,10 @@ from core.errors import SceneInvalid
 from exporters.gltf import extension
 from exporters.gltf.blob import Blob
 from exporters.gltf.cameras import camera_json
-from exporters.gltf.limits import check_size
-from exporters.gltf.numbers import column_major
 from exporters.gltf.placement import nearest_rotation, trs
-from exporters.gltf.png import encode_pngs
+from exporters.limits import check_size
+from exporters.numbers import column_major
+from exporters.png import encode_pngs
 
 FILE_NAME = "scene.glb"
 IMAGES_PER_PAGE = 3  # features 0-3, features 4-7, fallback colour

@@ -14,7 +14,7 @@ from core.baked import BakedScene
 from core.errors import AssetInvalid
 from exporters.gltf import read_glb, read_shaders, write_glb
 from exporters.gltf.extension import NAME
-from exporters.gltf.png import encode_png
+from exporters.png import encode_png
 from tests.scenes import random_scene
 from tests.unit.exporters.glb import join, split
 

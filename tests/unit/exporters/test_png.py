@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from core.errors import AssetInvalid
-from exporters.gltf.png import decode_png, encode_png, encode_pngs
+from exporters.png import decode_png, encode_png, encode_pngs
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 

@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 from core.conventions import MAX_PAGE_SIZE_PX
-from exporters.gltf.invalid import invalid
+from exporters.invalid import invalid
 
 # Measured on a 2048² page of 17 x 17 patches with noise, Pillow, one core: default strategy level 1 0.55 s 8.4 MB,
 # level 6 0.77 s 7.6 MB, level 9 1.5 s 7.5 MB; run-length strategy 0.39 s 7.5 MB at any level. Features are too noisy

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from exporters.gltf.invalid import invalid
+from exporters.invalid import invalid
 
 
 def column_major(matrix: np.ndarray) -> list[float]:

@@ -59,3 +59,68 @@ def change_frame(folder: Path, index: int, **changes) -> Path:
     fields["frames"][index].update(changes)
     write_json(path, fields)
     return folder
+
+
+def colmap_image(index: int) -> tuple[np.ndarray, np.ndarray]:
+    """(camera_from_world rotation [3, 3], translation [3]) with OpenCV axes, of the camera that `pose(index)` is."""
+    opengl = np.array(pose(index))
+    rotation = (opengl[:3, :3] * [1, -1, -1]).T
+    return rotation, -rotation @ opengl[:3, 3]
+
+
+def quaternion(rotation: np.ndarray) -> np.ndarray:
+    """(w, x, y, z) of a rotation [3, 3]: the eigenvector of Bar-Itzhack's matrix, which has no special cases."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
+    matrix = [
+        [xx + yy + zz, zy - yz, xz - zx, yx - xy],
+        [zy - yz, xx - yy - zz, xy + yx, xz + zx],
+        [xz - zx, xy + yx, yy - xx - zz, yz + zy],
+        [yx - xy, xz + zx, yz + zy, zz - xx - yy],
+    ]
+    return np.linalg.eigh(np.array(matrix))[1][:, -1]
+
+
+def colmap_model(folder: Path, names: list[str], camera="PINHOLE 8 6 10 11 4.25 2.75", points=20) -> Path:
+    """A sparse model as text: every point is around the origin and seen by every image."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "cameras.txt").write_text(f"# a comment\n1 {camera}\n")
+    images = ["# a comment"]
+    for index, name in enumerate(names):
+        rotation, translation = colmap_image(index)
+        numbers = " ".join(repr(float(value)) for value in (*quaternion(rotation), *translation))
+        images += [f"{index + 1} {numbers} 1 {name}", "1.5 2.5 1" if index % 2 else ""]
+    (folder / "images.txt").write_text("\n".join(images) + "\n")
+    positions = np.random.default_rng(0).uniform(-1, 1, (points, 3))
+    track = " ".join(f"{index + 1} 0" for index in range(len(names)))
+    lines = [f"{i} {x!r} {y!r} {z!r} 9 9 9 0.5 {track}" for i, (x, y, z) in enumerate(positions.tolist())]
+    (folder / "points3D.txt").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+def colmap(folder: Path, count=10, size=(8, 6), model="sparse/0", photos="images", **options) -> Path:
+    """A COLMAP capture."""
+    names = [f"{index:04}.png" for index in range(count)]
+    for name in names:
+        write_photo(folder / photos / name, size, "RGB")
+    colmap_model(folder / model, names, **options)
+    return folder
+
+
+def llff_rows(count=10, full_size=(32, 24)) -> np.ndarray:
+    """The content of a poses_bounds.npy: axes (down, right, backwards), position, (height, width, focal), bounds."""
+    rows = []
+    for index in range(count):
+        right, up, back, position = np.array(pose(index))[:3].T
+        matrix = np.stack([-up, right, back, position, [full_size[1], full_size[0], 40.0]], 1)
+        rows.append([*matrix.ravel(), 1.0 + 0.1 * index, 20.0])
+    return np.array(rows)
+
+
+def llff(folder: Path, count=10, photos=("images_4",), full_size=(32, 24)) -> Path:
+    """An LLFF capture with some of its folders of photos."""
+    for name in photos:
+        scale = int(name.partition("_")[2] or 1)
+        for index in range(count):
+            write_photo(folder / name / f"image{index:03}.png", (full_size[0] // scale, full_size[1] // scale), "RGB")
+    np.save(folder / "poses_bounds.npy", llff_rows(count, full_size))
+    return folder

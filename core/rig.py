@@ -16,8 +16,8 @@ import numpy as np
 if TYPE_CHECKING:
     from core.capture import View
 
-# Pull of the guessed centre on the least-squares one: decides only where all axes lie within about 0.6 degrees.
-GUESS_WEIGHT = 1e-4
+# Pull of the guessed centre on the least-squares one: decides only where all axes lie within about 0.2 degrees.
+GUESS_WEIGHT = 1e-5
 # Depth of the scene where nothing tells it, in spreads of the cameras: a usual ratio of stereo baseline and depth.
 GUESSED_DEPTH = 4.0
 # Below it, the mean of the axes says nothing: the cameras look everywhere.

@@ -153,7 +153,9 @@ def check_similarity(subject: str, matrix: np.ndarray) -> None:
     ok = SMALLEST_SCALE <= scale <= 1 / SMALLEST_SCALE and np.array_equal(np.asarray(matrix)[3], [0, 0, 0, 1])
     if ok:
         block = np.asarray(matrix, np.float64)[:3, :3] / scale
-        ok = np.allclose(block.T @ block, np.eye(3), atol=SIMILARITY_TOLERANCE) and bool(np.linalg.det(block) > 0)
+        with np.errstate(over="ignore", invalid="ignore"):
+            orthogonal = np.allclose(block.T @ block, np.eye(3), atol=SIMILARITY_TOLERANCE)
+        ok = orthogonal and bool(np.linalg.det(block) > 0)
     rule = f"must be a rotation, a translation and one scale, {SMALLEST_SCALE:g} to {1 / SMALLEST_SCALE:g}"
     _require(ok, subject, rule, str(np.asarray(matrix).tolist()))
 

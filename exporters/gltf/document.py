@@ -1,8 +1,10 @@
-"""A .glb taken apart, with every access checked."""
+"""A glTF file taken apart, with every access checked."""
 
 import json
 import struct
+from collections.abc import Mapping
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 
@@ -23,24 +25,41 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 
 
 class Document:
-    """glTF JSON and its binary chunk.
+    """glTF JSON, and the bytes that it refers to.
 
     Attributes:
-        json: the JSON chunk.
-        binary: the binary chunk, without padding rules checked.
+        json: the JSON.
+        binary: the binary chunk of a .glb, without padding rules checked; None of a .gltf.
+        files: what URIs may name.
 
     Raises:
         AssetInvalid
     """
 
-    def __init__(self, data: bytes) -> None:
-        chunk, self.binary = _chunks(data)
+    def __init__(self, text: bytes, binary: bytes | None, files: Mapping[str, bytes]) -> None:
+        self.binary, self.files = binary, files
         try:
-            self.json: dict[str, Any] = json.loads(chunk, parse_constant=_refuse_constant)
+            self.json: dict[str, Any] = json.loads(text, parse_constant=_refuse_constant)
         except (ValueError, RecursionError) as error:  # UnicodeDecodeError and JSONDecodeError are ValueErrors
             raise invalid("glTF JSON", "must be valid JSON", str(error)[:120]) from error
         if not isinstance(self.json, dict):
             raise invalid("glTF JSON", "must be an object", type(self.json).__name__)
+
+    @classmethod
+    def of_glb(cls, data: bytes) -> "Document":
+        """Of a .glb: everything is within."""
+        text, binary = _chunks(data)
+        return cls(text, binary, {})
+
+    @classmethod
+    def of_files(cls, files: Mapping[str, bytes]) -> "Document":
+        """Of a .gltf and the files beside it, by name; all in one folder, which may be part of the names."""
+        names = [name for name in files if name.endswith(".gltf")]
+        if len(names) != 1:
+            raise invalid("files", "must have one .gltf", f"{len(names)}")
+        folder = names[0].rpartition("/")[0]
+        beside = {name.removeprefix(f"{folder}/"): data for name, data in files.items()} if folder else files
+        return cls(files[names[0]], None, beside)
 
     def item(self, kind: str, index: Any) -> dict[str, Any]:
         """`json[kind][index]`, an object."""
@@ -57,9 +76,9 @@ class Document:
         """The bytes of a buffer view."""
         view = self.item("bufferViews", index)
         subject = f"bufferViews[{index}]"
-        if view.get("buffer") != 0 or "uri" in self.item("buffers", 0) or "byteStride" in view:
-            raise invalid(subject, "must lie unstrided in the file's own binary chunk", str(view)[:80])
-        return _slice(memoryview(self.binary), view.get("byteOffset", 0), view.get("byteLength"), subject)
+        if view.get("buffer") != 0 or "byteStride" in view:
+            raise invalid(subject, "must lie unstrided in buffer 0", str(view)[:80])
+        return _slice(memoryview(self._buffer()), view.get("byteOffset", 0), view.get("byteLength"), subject)
 
     def accessor(self, index: Any, width: str, components: tuple[int, ...]) -> np.ndarray:
         """[count, n] (or [count] for SCALAR) of an accessor whose type and component type must be as given."""
@@ -80,7 +99,22 @@ class Document:
     def image_bytes(self, texture: Any) -> bytes:
         """The image file behind a texture."""
         image = self.item("images", self.item("textures", texture).get("source"))
-        return bytes(self.view_bytes(image.get("bufferView")))
+        return self._file(image["uri"]) if "uri" in image else bytes(self.view_bytes(image.get("bufferView")))
+
+    def _buffer(self) -> bytes:
+        buffer = self.item("buffers", 0)
+        if "uri" in buffer:
+            return self._file(buffer["uri"])
+        if self.binary is None:
+            raise invalid("buffers[0]", "must name its file", "no uri")
+        return self.binary
+
+    def _file(self, uri: Any) -> bytes:
+        name = unquote(uri) if isinstance(uri, str) else ""
+        if name not in self.files:
+            rule = "must be within the file" if self.binary is not None else "must be among the files given"
+            raise invalid(str(uri)[:80], rule, "a reference to another file")
+        return self.files[name]
 
 
 def _chunks(data: bytes) -> tuple[bytes, bytes]:

@@ -1,5 +1,6 @@
-"""A .glb with POLYFIELD_materials_neural, back as the baked scene it was written from."""
+"""A .glb or .gltf with POLYFIELD_materials_neural, back as the baked scene it was written from."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -29,17 +30,17 @@ def read_glb(data: bytes) -> BakedScene:
         AssetInvalid: damaged, or not a file of this kind. Nothing else, whatever the bytes.
     """
     with only_asset_invalid(extension.NAME):
-        document = Document(data)
-        root = _root_extension(document)
-        return BakedScene(
-            pages=_pages(document),
-            network=extension.network_from_json(_network(root)),
-            background=_background(root),
-            asset_from_object=_asset_from_object(document),
-            cameras=_cameras(document, root),
-            user_from_object=_user_from_object(root),
-            start_camera=root.get("startView"),
-        )
+        return _scene(Document.of_glb(data))
+
+
+def read_gltf(files: Mapping[str, bytes]) -> BakedScene:
+    """The scene in a .gltf and its files, by name, as `read_glb`.
+
+    Raises:
+        AssetInvalid: as above; also where files are missing.
+    """
+    with only_asset_invalid(extension.NAME):
+        return _scene(Document.of_files(files))
 
 
 def read_shaders(data: bytes) -> dict[str, ShaderSources]:
@@ -49,7 +50,20 @@ def read_shaders(data: bytes) -> dict[str, ShaderSources]:
         AssetInvalid
     """
     with only_asset_invalid(extension.NAME):
-        return extension.shaders_from_json(_network(_root_extension(Document(data))))
+        return extension.shaders_from_json(_network(_root_extension(Document.of_glb(data))))
+
+
+def _scene(document: Document) -> BakedScene:
+    root = _root_extension(document)
+    return BakedScene(
+        pages=_pages(document),
+        network=extension.network_from_json(_network(root)),
+        background=_background(root),
+        asset_from_object=_asset_from_object(document),
+        cameras=_cameras(document, root),
+        user_from_object=_user_from_object(root),
+        start_camera=root.get("startView"),
+    )
 
 
 def _root_extension(document: Document) -> dict[str, Any]:

@@ -1,5 +1,6 @@
-"""A baked scene as one .glb."""
+"""A baked scene as one .glb, or as a .gltf with its files."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,11 @@ from exporters.numbers import column_major
 from exporters.png import encode_pngs
 
 FILE_NAME = "scene.glb"
+GLTF_NAME = "scene.gltf"
+BUFFER_NAME = "scene.bin"
 IMAGES_PER_PAGE = 3  # features 0-3, features 4-7, fallback colour
 ALPHA_CUTOFF = 0.5
+ImageStore = Callable[[str, bytes], gltf.Image]  # takes a PNG by its name; the glTF image that refers to it
 _PRIMITIVE_RESTART_U16 = 65535  # an index that glTF forbids
 
 
@@ -30,17 +34,47 @@ def write_glb(scene: BakedScene) -> dict[str, bytes]:
     Raises:
         SceneInvalid: the pages exceed what a reader accepts.
     """
-    check_size([page.features_u8.shape[:2] for page in scene.pages], SceneInvalid)
     blob = Blob()
+
+    def within(name: str, png: bytes) -> gltf.Image:
+        return gltf.Image(name=name, mimeType="image/png", bufferView=blob.append(png))
+
+    document = _document(scene, blob, within)
+    document.set_binary_blob(bytes(blob.data))
+    return {FILE_NAME: b"".join(document.save_to_bytes())}
+
+
+def write_gltf(scene: BakedScene) -> dict[str, bytes]:
+    """`scene.gltf`, `scene.bin` and a PNG per texture: what `write_glb` writes, for tools that want to see the parts.
+
+    `read_gltf` returns the scene as `read_glb` does.
+
+    Raises:
+        SceneInvalid: the pages exceed what a reader accepts.
+    """
+    blob = Blob()
+    files: dict[str, bytes] = {}
+
+    def beside(name: str, png: bytes) -> gltf.Image:
+        files[f"{name}.png"] = png
+        return gltf.Image(name=name, mimeType="image/png", uri=f"{name}.png")
+
+    document = _document(scene, blob, beside)
+    document.buffers[0].uri = BUFFER_NAME
+    return {GLTF_NAME: document.gltf_to_json().encode(), BUFFER_NAME: bytes(blob.data), **files}
+
+
+def _document(scene: BakedScene, blob: Blob, image: ImageStore) -> gltf.GLTF2:
+    """The whole document; what is binary is in `blob`, or where `image` puts it."""
+    check_size([page.features_u8.shape[:2] for page in scene.pages], SceneInvalid)
     document = _empty_document()
-    _add_pages(document, blob, scene)
+    _add_pages(document, blob, scene, image)
     views = _add_cameras(document, scene)
     _add_object_node(document, scene)
     document.extensions = {extension.NAME: _root(scene, views)}
     document.bufferViews = blob.views
     document.buffers = [gltf.Buffer(byteLength=len(blob.data))]
-    document.set_binary_blob(bytes(blob.data))
-    return {FILE_NAME: b"".join(document.save_to_bytes())}
+    return document
 
 
 def _empty_document() -> gltf.GLTF2:
@@ -58,14 +92,13 @@ def _empty_document() -> gltf.GLTF2:
     )
 
 
-def _add_pages(document: gltf.GLTF2, blob: Blob, scene: BakedScene) -> None:
-    images = [image for page in scene.pages for image in _page_images(page)]
-    pngs = encode_pngs(images)
+def _add_pages(document: gltf.GLTF2, blob: Blob, scene: BakedScene, image: ImageStore) -> None:
+    pngs = encode_pngs([pixels for page in scene.pages for pixels in _page_images(page)])
     for number, page in enumerate(scene.pages):
         first = IMAGES_PER_PAGE * number
         for png, label in zip(pngs[first : first + 3], ("features0", "features1", "color"), strict=True):
             name = f"page{number}.{label}"
-            document.images.append(gltf.Image(name=name, mimeType="image/png", bufferView=blob.append(png)))
+            document.images.append(image(name, png))
             document.textures.append(gltf.Texture(name=name, sampler=0, source=len(document.images) - 1))
         document.materials.append(_fallback_material(number, first + 2))
         primitive = _primitive(document, blob, page, number)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from core.baked import BakedScene
-from exporters.gltf import write_glb
+from exporters.gltf import write_glb, write_gltf
 from tests.scenes import random_scene
 
 SCRIPT = Path(__file__).with_name("validate_gltf.mjs")
@@ -21,12 +21,16 @@ NODE_MODULES = Path(__file__).parents[2] / "viewer_static" / "node_modules"
 
 
 def validated(glb: bytes, folder: Path) -> dict[str, Any]:
-    """The validator's report on a file."""
+    """The validator's report on a .glb."""
+    (folder / "scene.glb").write_bytes(glb)
+    return validated_file(folder / "scene.glb")
+
+
+def validated_file(path: Path) -> dict[str, Any]:
+    """The validator's report on a .glb, or a .gltf with its files beside it."""
     node = shutil.which("node", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
     assert node, "Node is missing, both on the PATH and beside Python"
     assert (NODE_MODULES / "gltf-validator").is_dir(), "gltf-validator is missing: run `npm ci` in viewer_static"
-    path = folder / "scene.glb"
-    path.write_bytes(glb)
     run = subprocess.run([node, SCRIPT, NODE_MODULES, path], capture_output=True, text=True, timeout=60, check=True)
     return json.loads(run.stdout)
 
@@ -44,6 +48,14 @@ def test_validator_finds_nothing_in_a_scene_with_pages_and_cameras(scene: BakedS
     assert_clean(report)
     assert report["info"]["totalTriangleCount"] == scene.triangle_count
     assert report["info"]["maxUVs"] == 1
+
+
+def test_validator_finds_nothing_in_the_gltf_with_files(scene: BakedScene, tmp_path: Path) -> None:
+    for name, data in write_gltf(scene).items():
+        (tmp_path / name).write_bytes(data)
+    report = validated_file(tmp_path / "scene.gltf")
+    assert_clean(report)
+    assert len(report["info"]["resources"]) == 1 + 3 * len(scene.pages)
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.5, 1e-6, 1e6])

@@ -1,5 +1,6 @@
 """What a job offers for download. No other file of its folder is reachable."""
 
+import json
 from typing import Any
 
 from fastapi import Request, Response
@@ -8,7 +9,14 @@ from fastapi.responses import FileResponse
 from service.errors import ArtifactNotFound
 from service.job_folder import JobFolder
 
-MEDIA_TYPES = {"scene.glb": "model/gltf-binary", "preview.png": "image/png", "report.json": "application/json"}
+CAPTURE_JSON, CAPTURE_PICTURE = "capture.json", "capture.png"
+MEDIA_TYPES = {
+    "scene.glb": "model/gltf-binary",
+    "preview.png": "image/png",
+    "report.json": "application/json",
+    CAPTURE_JSON: "application/json",
+    CAPTURE_PICTURE: "image/png",
+}
 
 
 def list_artifacts(folder: JobFolder) -> list[dict[str, Any]]:
@@ -23,6 +31,15 @@ def list_artifacts(folder: JobFolder) -> list[dict[str, Any]]:
     return found
 
 
+def capture_summary(folder: JobFolder) -> dict[str, Any] | None:
+    """The capture report's lines (`label`, `text`, `warns`); None until it is there. capture.json has all of it."""
+    try:
+        report = json.loads((folder.artifacts / CAPTURE_JSON).read_bytes())
+    except FileNotFoundError:
+        return None
+    return {"lines": report["lines"]}
+
+
 def artifact_response(request: Request, folder: JobFolder, name: str) -> Response:
     """The file, a range of it, or 304 where the client has it already.
 
@@ -31,7 +48,7 @@ def artifact_response(request: Request, folder: JobFolder, name: str) -> Respons
     """
     path = folder.artifacts / name
     if name not in MEDIA_TYPES or not path.is_file():
-        remedy = f"One of {', '.join(MEDIA_TYPES)}; they are written when the job succeeds."
+        remedy = f"One of {', '.join(MEDIA_TYPES)}; they are written as the job proceeds."
         raise ArtifactNotFound(f"artifact {name[:64]!r}", "must exist", "no such file", remedy)
     # The preview changes while a job runs, so a cache has to ask each time; the ETag makes asking cheap.
     headers = {"Cache-Control": "no-cache", "X-Content-Type-Options": "nosniff"}

@@ -1,5 +1,6 @@
 """The whole path: photos -> capture -> scene -> scene.glb, read again and measured."""
 
+import contextlib
 import shutil
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -8,20 +9,22 @@ from typing import Any
 
 from core.baked import BakedScene
 from core.capture import WHITE
-from core.datasets import read_capture
 from core.device import resolve_device
 from core.evaluation import Evaluation, evaluate
 from core.presets import settings_for
 from core.progress import ProgressCallback, ignore_progress
 from core.reconstruct import reconstruct
+from core.scene_kind import AUTO
 from exporters.gltf import read_glb, write_glb
 from service.atomic import write_atomically
 from service.capture_source import opened_capture
+from service.prepared import Preparation, ReportCallback
 from service.preview import png_bytes, preview
 from service.report import Figure, Report
 from service.stages import EXPORT, MEASURE, READ, TRAIN, Stages
 
 SCENE, PREVIEW, REPORT = "scene.glb", "preview.png", "report.json"
+POSING = "posing"
 NO_HELD_OUT = "No view is held out, so the quality was not measured."
 RESUMED = "Training was interrupted and went on from its checkpoint."
 BEST_PSNR = 100.0  # what an infinite one is reported as: JSON has no infinity
@@ -38,34 +41,49 @@ def convert(
     downscale: int = 1,
     max_size_px: int | None = None,
     background: tuple[float, float, float] = WHITE,
+    scene_kind: str = AUTO,
+    skip_missing: bool = False,
     progress: ProgressCallback = ignore_progress,
+    on_report: ReportCallback = lambda report: None,
     checkpoint_dir: Path | None = None,
+    posing_dir: Path | None = None,
 ) -> Report:
-    """Turns a capture into `scene.glb`, `preview.png` and `report.json` in `out_dir`.
+    """Turns a capture into `scene.glb`, `preview.png` and `report.json` in `out_dir`, or photos whose cameras are
+    estimated first. Before training it writes the capture report, `capture.json` and `capture.png`.
 
     Every figure is measured on the scene.glb as written, read again: never on the trainer. Each file appears whole or
     not at all, the report last.
 
     Args:
-        capture_path: a folder, a pose file or a .zip of a capture.
+        capture_path: a folder, a pose file or a .zip of a capture, or of photos without poses.
         out_dir: made when missing.
         preset, overrides: see core.presets.
         device: auto, cpu, cuda or cuda:N.
-        downscale, max_size_px, background: see `read_capture`.
+        downscale, max_size_px, background, skip_missing: see `read_capture`.
+        scene_kind: auto, object, forward or unbounded.
         progress: is told stage and fraction of the whole, and now and then a preview.
+        on_report: is told the capture report before training starts.
         checkpoint_dir: kept up to date while training; a conversion that was stopped goes on from there. Removed on
             success.
+        posing_dir: keeps the cameras estimated of photos without poses, a COLMAP model; `posing` in `out_dir` by
+            default. A second conversion of the same photos uses it.
 
     Raises:
-        InputError: the capture or an option cannot be used.
+        InputError: the capture or an option cannot be used. Where photos cannot be posed (PosesNotFound), the capture
+            report is written all the same.
         TrainingFailed
     """
     stages = Stages(progress)
     settings = settings_for(preset, **(overrides or {}))
     device = resolve_device(device)
     photos: dict[str, Any] = {"downscale": downscale, "max_size_px": max_size_px, "background": background}
-    with stages.stage("read", READ), opened_capture(capture_path) as source:
-        capture = read_capture(source, **photos)
+    photos["skip_missing"] = skip_missing
+    posing_dir = posing_dir or out_dir / POSING
+    preparation = Preparation(settings, device, seed, {**photos, "kind": scene_kind}, out_dir, posing_dir, on_report)
+    with contextlib.ExitStack() as opened:
+        with stages.stage("read", READ):
+            source = opened.enter_context(opened_capture(capture_path))
+        capture, capture_report = preparation.prepared(source, stages)
     trained = reconstruct(
         capture, settings, device=device, seed=seed, checkpoint_dir=checkpoint_dir, progress=stages.within(TRAIN)
     )
@@ -84,9 +102,10 @@ def convert(
         quads=scene.quad_count,
         triangles=scene.triangle_count,
         pages=len(scene.pages),
-        settings=asdict(settings) | {"seed": seed, **photos},
+        settings=asdict(settings) | {"seed": seed, "scene_kind": scene_kind, **photos},
         device=device,
         views={"train": len(capture.train), "test": len(capture.test)},
+        capture=capture_report.as_json(),
         notes=capture.notes + (() if capture.test else (NO_HELD_OUT,)) + ((RESUMED,) if trained.resumed else ()),
     )
     _write(out_dir, {REPORT: report.as_bytes()})

@@ -21,6 +21,7 @@ class JobFolder:
 
     capture/         the upload. Kept after success, so that another export can be measured on the same held-out
                      views; the scene itself is read back from artifacts/scene.glb.
+    posing/          of photos without poses: what was found of their cameras. Kept like the upload.
     checkpoint/      the trainer's state; gone once the job has ended.
     artifacts/       what a client may download.
     job.json         the request: id, name, created_at, images, options.
@@ -38,6 +39,10 @@ class JobFolder:
     @property
     def capture(self) -> Path:
         return self.path / "capture"
+
+    @property
+    def posing(self) -> Path:
+        return self.path / "posing"
 
     @property
     def checkpoint(self) -> Path:
@@ -66,8 +71,9 @@ class JobFolder:
         _write_json(self.path / "progress.json", report)
 
     def drop_inputs(self) -> None:
-        """Removes the upload and the checkpoint: of a job that was refused or cancelled nothing else is of use."""
+        """Removes the upload and what was made of it: a job that was refused or cancelled has no use for it."""
         shutil.rmtree(self.capture, ignore_errors=True)
+        shutil.rmtree(self.posing, ignore_errors=True)
         self.drop_checkpoint()
 
     def drop_checkpoint(self) -> None:

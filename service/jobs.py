@@ -9,7 +9,7 @@ from typing import Any
 
 from dbos import DBOSClient, WorkflowSerializationFormat, WorkflowStatus
 
-from service.artifacts import list_artifacts
+from service.artifacts import capture_summary, list_artifacts
 from service.database import APPLICATION, PROGRESS_STREAM, QUEUE, WORKFLOW
 from service.errors import JobBusy, JobInterrupted, JobNotFound
 from service.job_folder import JOB_ID, JobFolder
@@ -138,6 +138,7 @@ class Jobs:
             "ended": _time_text(row.completed_at),
             "options": request.get("options", {}),
             **(folder.progress() or NO_PROGRESS),
+            "capture": capture_summary(folder),
             "problem": problem,
             "artifacts": list_artifacts(folder),
         }

@@ -8,12 +8,14 @@ from typing import Any
 from core.capture import WHITE
 from core.errors import OptionInvalid
 from core.presets import settings_for
+from core.scene_kind import AUTO, check_kind_name
 
 DEVICE = re.compile(r"auto|cpu|cuda(:\d+)?")
 MAX_DOWNSCALE = 16
 SIZE_RANGE_PX = (16, 20_000)
 MAX_SEED = 2**31 - 1
 WHOLE_NUMBERS = ("seed", "downscale", "max_size_px")
+TRUTHS = {"true": True, "1": True, "yes": True, "on": True, "false": False, "0": False, "no": False, "off": False}
 NAMED_BACKGROUNDS = {"white": WHITE, "black": (0.0, 0.0, 0.0)}
 
 
@@ -28,6 +30,8 @@ class Options:
         downscale: photos are reduced by this whole factor, 1 to 16.
         max_size_px: photos are reduced to this longest side at most, 16 to 20000; None for no bound.
         background: sRGB in [0, 1], behind the transparent pixels of photos.
+        scene_kind: auto, object, forward or unbounded.
+        skip_missing: leave out photos that the poses name but the capture lacks.
         overrides: settings that replace the preset's; numbers may be text.
 
     Raises:
@@ -40,6 +44,8 @@ class Options:
     downscale: int = 1
     max_size_px: int | None = None
     background: tuple[float, float, float] = WHITE
+    scene_kind: str = AUTO
+    skip_missing: bool = False
     overrides: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -48,6 +54,7 @@ class Options:
         settings_for(self.preset, **self.overrides)
         if not DEVICE.fullmatch(self.device):
             raise OptionInvalid("device", "must be auto, cpu, cuda or cuda:N", repr(self.device))
+        check_kind_name(self.scene_kind, auto=True)
         _require_between("seed", self.seed, 0, MAX_SEED)
         _require_between("downscale", self.downscale, 1, MAX_DOWNSCALE)
         if self.max_size_px is not None:
@@ -58,13 +65,16 @@ class Options:
         """Options from the words of a form or a command line; what is absent or empty keeps its default.
 
         Args:
-            words: any of preset, device, seed, downscale, max_size_px, background ("white", "black", "#rrggbb").
+            words: any of preset, device, seed, downscale, max_size_px, background ("white", "black", "#rrggbb"),
+                scene_kind and skip_missing ("true", "false").
             assignments: settings that replace the preset's, as "name=value".
         """
-        chosen: dict[str, Any] = {name: words[name] for name in ("preset", "device") if words.get(name)}
+        chosen: dict[str, Any] = {name: words[name] for name in ("preset", "device", "scene_kind") if words.get(name)}
         chosen |= {name: _whole(name, words[name]) for name in WHOLE_NUMBERS if words.get(name)}
         if words.get("background"):
             chosen["background"] = _color(words["background"])
+        if words.get("skip_missing"):
+            chosen["skip_missing"] = _truth("skip_missing", words["skip_missing"])
         return cls(**chosen, overrides=dict(_assignment(text) for text in assignments))
 
     @classmethod
@@ -86,6 +96,12 @@ def _whole(name: str, text: str) -> int:
         return int(text)
     except ValueError:
         raise OptionInvalid(name, "must be a whole number", repr(text[:40])) from None
+
+
+def _truth(name: str, text: str) -> bool:
+    if text.lower() not in TRUTHS:
+        raise OptionInvalid(name, "must be true or false", repr(text[:40]))
+    return TRUTHS[text.lower()]
 
 
 def _color(text: str) -> tuple[float, float, float]:

@@ -2,10 +2,15 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
 
 ByteString: TypeAlias = bytes  # Report has a field of that name
+
+
+def json_bytes(value: Mapping[str, Any]) -> ByteString:
+    """A JSON file."""
+    return json.dumps(value, indent=2, allow_nan=False).encode()
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,7 @@ class Report:
         device: that trained it, cpu or cuda:N.
         views: photos trained on and held out.
         notes: remarks for the user.
+        capture: the capture report, as in capture.json.
     """
 
     psnr: Figure
@@ -47,6 +53,7 @@ class Report:
     device: str
     views: Mapping[str, int]
     notes: tuple[str, ...]
+    capture: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def from_bytes(cls, data: ByteString) -> "Report":
@@ -57,7 +64,7 @@ class Report:
 
     def as_bytes(self) -> ByteString:
         """report.json."""
-        return json.dumps(asdict(self), indent=2, allow_nan=False).encode()
+        return json_bytes(asdict(self))
 
     def as_table(self) -> str:
         """For a terminal."""

@@ -18,7 +18,7 @@ FORM = {
         "files": {
             "type": "array",
             "items": {"type": "string", "format": "binary"},
-            "description": "Photos and pose files, named relative to the capture (train/r_0.png), or one .zip of them.",
+            "description": "Photos, with pose files or alone, named relative to the capture (images/1.png), or a .zip.",
         },
         "name": {"type": "string"},
         "preset": {"type": "string", "default": "balanced"},
@@ -27,6 +27,12 @@ FORM = {
         "downscale": {"type": "integer", "default": 1, "minimum": 1, "maximum": 16},
         "max_size_px": {"type": "integer", "description": "longest side of a photo at most"},
         "background": {"type": "string", "default": "white", "description": "white, black or #rrggbb"},
+        "scene_kind": {"type": "string", "default": "auto", "description": "auto, object, forward or unbounded"},
+        "skip_missing": {
+            "type": "boolean",
+            "default": False,
+            "description": "leave out photos that the poses name but the capture lacks",
+        },
         "set": {"type": "array", "items": {"type": "string"}, "description": "name=value, a setting of the preset"},
     },
 }
@@ -98,5 +104,5 @@ async def delete_job(request: Request, job_id: str) -> Response:
 @router.get("/jobs/{job_id}/artifacts/{name}")
 @router.head("/jobs/{job_id}/artifacts/{name}", include_in_schema=False)
 async def get_artifact(request: Request, job_id: str, name: str) -> Response:
-    """`scene.glb`, `preview.png` or `report.json`; ranges and ETags are honoured."""
+    """`scene.glb`, `preview.png`, `report.json`, `capture.json` or `capture.png`; ranges and ETags are honoured."""
     return artifact_response(request, _jobs(request).folder(job_id), name)

@@ -14,6 +14,8 @@ READ = (0.0, 0.02)
 TRAIN = (0.02, 0.95)
 EXPORT = (0.95, 0.97)
 MEASURE = (0.97, 1.0)
+# Estimating the cameras of photos without poses comes before all that, and takes about this share of everything.
+POSING_SHARE = 0.25
 
 
 class Stages:
@@ -26,6 +28,7 @@ class Stages:
     def __init__(self, callback: ProgressCallback) -> None:
         self._callback = callback
         self._fraction = 0.0
+        self._start = 0.0  # where reading starts
         self._psnr: float | None = None
         self.seconds: dict[str, float] = {}
 
@@ -35,25 +38,33 @@ class Stages:
         self.report(name, span[0])
         started = time.perf_counter()
         yield
-        self.seconds[name] = time.perf_counter() - started
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - started
 
     def add(self, seconds: Mapping[str, float]) -> None:
         """Takes over what a part timed itself."""
         self.seconds |= seconds
 
+    def posing(self) -> ProgressCallback:
+        """A callback for the estimation of cameras; all other stages come after it from now on."""
+        self._start = POSING_SHARE
+        return lambda report: self._send(replace(report, fraction=POSING_SHARE * report.fraction))
+
     def within(self, span: tuple[float, float]) -> ProgressCallback:
         """A callback for a part of the work that reports its own fraction, 0 to 1."""
 
         def inner(report: Progress) -> None:
-            self._send(replace(report, fraction=span[0] + (span[1] - span[0]) * report.fraction))
+            self._send(replace(report, fraction=self._of_whole(span[0] + (span[1] - span[0]) * report.fraction)))
 
         return inner
 
     def report(
         self, stage: str, fraction: float, *, psnr: float | None = None, preview_u8: np.ndarray | None = None
     ) -> None:
-        """Reports a fraction of the whole."""
-        self._send(Progress(stage, fraction, psnr, preview_u8))
+        """Reports a fraction of all stages from reading on."""
+        self._send(Progress(stage, self._of_whole(fraction), psnr, preview_u8))
+
+    def _of_whole(self, fraction: float) -> float:
+        return self._start + (1.0 - self._start) * fraction
 
     def _send(self, report: Progress) -> None:
         self._fraction = min(1.0, max(self._fraction, report.fraction))

@@ -64,6 +64,7 @@ def _run(folder: JobFolder, channel: IO[str]) -> None:
         **options.as_json(),
         progress=progress,
         checkpoint_dir=folder.checkpoint,
+        posing_dir=folder.posing,
     )
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from fastapi import Request
 
-from core.datasets import check_capture
+from core.datasets import check_capture, photos_without_poses
 from core.errors import NoImages, UploadTooLarge
+from core.posing.photo_set import find_photo_set
 from service.archive import extract
 from service.errors import RequestInvalid
 from service.form import SHRINK, Form, receive_form
@@ -37,7 +38,7 @@ async def receive_job(request: Request, settings: ServiceSettings) -> JobFolder:
         content_type = request.headers.get("content-type", "")
         form = await receive_form(content_type, request.stream(), received, settings.limits)
         options = Options.from_text(form.words(), form.fields.get(SETTING_FIELD, ()))
-        await asyncio.to_thread(_make_capture, form, received, staging, settings.limits)
+        await asyncio.to_thread(_make_capture, form, received, staging, settings.limits, options)
         accepted = JobFolder(settings.jobs / job_id)
         await asyncio.to_thread(_accept, staging, _request_of(job_id, form, options), accepted)
         return accepted
@@ -57,9 +58,9 @@ def _refuse_announced(request: Request, limits: Limits) -> None:
         raise UploadTooLarge("upload", f"at most {limits.upload_bytes} bytes", announced, SHRINK)
 
 
-def _make_capture(form: Form, received: Path, folder: JobFolder, limits: Limits) -> None:
+def _make_capture(form: Form, received: Path, folder: JobFolder, limits: Limits, options: Options) -> None:
     if not form.files:
-        remedy = "Send the photos with their pose file, or one .zip of both."
+        remedy = "Send the photos, with their pose file if there is one, or one .zip of it all."
         raise NoImages("upload", "must hold photos", "no file", remedy)
     archives = [path for path in form.files if path.suffix.lower() == ".zip"]
     if not archives:
@@ -70,7 +71,14 @@ def _make_capture(form: Form, received: Path, folder: JobFolder, limits: Limits)
         shutil.rmtree(received)
     else:
         raise RequestInvalid("upload", "must be one .zip or loose files", "both", "Send one of them.")
-    check_capture(folder.capture)
+    _check(folder.capture, options)
+
+
+def _check(capture: Path, options: Options) -> None:
+    if photos_without_poses(capture) is None:
+        check_capture(capture, skip_missing=options.skip_missing)
+    else:
+        find_photo_set(capture)
 
 
 def _request_of(job_id: str, form: Form, options: Options) -> dict[str, object]:

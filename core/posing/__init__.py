@@ -2,13 +2,6 @@
 
     photos -> features (SIFT) -> matches of pairs that overlap -> cameras and points, one photo after another
 
-The model is left in COLMAP's own format, which `core.datasets` reads like anybody's.
+`structure_from_motion.pose_photos` is all of it. The model is left in COLMAP's own format, which `core.datasets` reads
+like anybody's. `photo_set` and `posing`, which the server needs, do without pycolmap.
 """
-
-from __future__ import annotations
-
-from core.posing.photo_set import PhotoSet, find_photo_set
-from core.posing.pose_photos import pose_photos
-from core.posing.posing import LeftOut, Posing
-
-__all__ = ["LeftOut", "PhotoSet", "Posing", "find_photo_set", "pose_photos"]

@@ -60,6 +60,7 @@ def _options(seed: int) -> pycolmap.IncrementalPipelineOptions:
     options = pycolmap.IncrementalPipelineOptions()
     options.min_model_size = MIN_MODEL_PHOTOS
     options.extract_colors = False
+    options.num_threads = options.mapper.num_threads = 1
     for part in (options, options.mapper, options.triangulation):
         part.random_seed = seed
     return options

@@ -6,12 +6,13 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from core.datasets import photos_without_poses
 from core.errors import InputError, NoImages, TooFewImages
 from core.images import SUFFIXES, read_size
 
 MIN_PHOTOS = 3  # two give no scale to check against; COLMAP starts from a pair and needs another to go on
 # Folders beside the photos that hold pictures which are no photos.
-NOT_PHOTOS = ("mask", "masks", "depth", "depths", "normal", "normals", "thumbs", "thumbnails")
+NOT_PHOTOS = ("mask", "depth", "depths", "normal", "normals", "thumbs", "thumbnails")
 
 
 @dataclass(frozen=True)
@@ -32,15 +33,19 @@ class PhotoSet:
         return self.folder / name
 
 
-def find_photo_set(folder: Path) -> PhotoSet:
-    """All photos in a folder and below, except in folders called "masks" and the like. Headers are checked.
+def find_photo_set(folder: Path, *, without: Path | None = None) -> PhotoSet:
+    """All photos of a folder without poses, except those in folders called "depth" and the like. Headers are checked.
 
-    The set's own folder is the one that holds them all, such as `images`. Other files (notes, calibration) do not disturb.
+    The set's own folder is the one that holds them all, such as `images`. Other files (notes, calibration) do not
+    matter.
+
+    Args:
+        without: a folder, perhaps below, that is not looked into.
 
     Raises:
         NoImages, TooFewImages
     """
-    names = sorted(_names_below(folder))
+    names = sorted(name for name in _names_below(folder) if not (without and (folder / name).is_relative_to(without)))
     inner = os.path.commonpath([name.rpartition("/")[0] for name in names]) if names else ""
     if inner:
         folder, names = folder / inner, [name[len(inner) + 1 :] for name in names]
@@ -56,14 +61,8 @@ def find_photo_set(folder: Path) -> PhotoSet:
 
 
 def _names_below(folder: Path) -> list[str]:
-    found = []
-    for path in folder.rglob("*"):
-        parts = path.relative_to(folder).parts
-        hidden = any(part.startswith(".") or part == "__MACOSX" for part in parts)
-        aside = any(part.lower() in NOT_PHOTOS for part in parts[:-1])
-        if path.suffix.lower() in SUFFIXES and not hidden and not aside and path.is_file():
-            found.append("/".join(parts))
-    return found
+    paths = [path.relative_to(folder) for path in photos_without_poses(folder) or ()]
+    return [path.as_posix() for path in paths if not any(part.lower() in NOT_PHOTOS for part in path.parts[:-1])]
 
 
 def _check_count(names: list[str], readable: tuple[str, ...]) -> None:

@@ -51,6 +51,11 @@ class Posing:
     notes: tuple[str, ...] = ()
 
     @property
+    def images(self) -> Path:
+        """The folder that all readable photos are linked in, under their names."""
+        return self.folder / "images"
+
+    @property
     def is_usable(self) -> bool:
         return len(self.registered) >= MIN_PHOTOS
 

@@ -16,19 +16,24 @@ CHOICES = {
     "downscale": "reduce the photos by this whole factor",
     "max-size-px": "reduce the photos to this longest side at most",
     "background": "white, black or #rrggbb, behind transparent pixels",
+    "scene-kind": "auto, object, forward or unbounded",
 }
+FLAGS = {"skip-missing": "leave out photos that the poses name but the capture lacks"}
 
 
 def add_options(parser: argparse.ArgumentParser, **defaults: str) -> None:
     """Adds what may be chosen for a conversion."""
     for name, text in CHOICES.items():
         parser.add_argument(f"--{name}", help=text, default=defaults.get(name, ""))
+    for name, text in FLAGS.items():
+        parser.add_argument(f"--{name}", help=text, action="store_const", const="true", default="")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="a setting of the preset")
 
 
 def form_words(arguments: argparse.Namespace) -> dict[str, str]:
     """The choices as the API's form fields."""
-    chosen = {name.replace("-", "_"): getattr(arguments, name.replace("-", "_")) for name in CHOICES}
+    names = [name.replace("-", "_") for name in (*CHOICES, *FLAGS)]
+    chosen = {name: getattr(arguments, name) for name in names}
     return {name: text for name, text in chosen.items() if text}
 
 

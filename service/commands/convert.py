@@ -10,8 +10,8 @@ CHECKPOINT = ".checkpoint"
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    parser = subparsers.add_parser("convert", help="turn posed photos into a .glb")
-    parser.add_argument("capture", type=Path, help="folder, pose file (.json) or .zip")
+    parser = subparsers.add_parser("convert", help="turn photos into a .glb")
+    parser.add_argument("capture", type=Path, help="folder of photos, with poses or without; pose file; or .zip")
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="DIR", help="where the results go")
     add_options(parser)
     parser.set_defaults(run=run)
@@ -28,6 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.out,
             **options.as_json(),
             progress=bar,
+            on_report=lambda found: bar.say(found.as_table()),
             checkpoint_dir=arguments.out / CHECKPOINT,
         )
     print(report.as_table())

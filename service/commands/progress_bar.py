@@ -32,6 +32,10 @@ class ProgressBar:
     def __call__(self, report: Progress) -> None:
         self.show(report.stage, report.fraction, report.psnr)
 
+    def say(self, text: str) -> None:
+        """Prints lines above the bar."""
+        tqdm.write(text, file=sys.stderr)
+
     def show(self, stage: str, fraction: float, psnr: float | None) -> None:
         """Moves the bar to `fraction` of the whole."""
         if self._plain and stage != self._stage:

@@ -46,9 +46,10 @@ def pose_photos(
     Raises:
         NoImages, TooFewImages
     """
-    photos = find_photo_set(Path(photos_folder))
+    photos_folder, work_folder = Path(photos_folder).absolute(), Path(work_folder).absolute()
+    photos = find_photo_set(photos_folder, without=_own(work_folder, photos_folder))
     headers = read_headers(photos)
-    workspace = Workspace(Path(work_folder))
+    workspace = Workspace(work_folder)
     workspace.claim(identity_of(photos, seed=seed))
     workspace.link_photos(photos, headers)
     if (posing := workspace.outcome()) is None:
@@ -59,6 +60,12 @@ def pose_photos(
         posing = _Run(photos, numbers, workspace, seed, progress).posing()
         workspace.finish(posing)
     return posing
+
+
+def _own(work_folder: Path, photos_folder: Path) -> Path:
+    """What is ours where people want the results beside the photos: pictures in there are not photos."""
+    results = work_folder.parent
+    return results if photos_folder in results.parents else work_folder
 
 
 class _Run:
@@ -89,8 +96,8 @@ class _Run:
         posed = set(models[0].reg_image_ids()) if models else set()
         left_out = [LeftOut(self.numbers[number], reasons[number]) for number in self.numbers if number not in posed]
         left_out += [LeftOut(name, f"that cannot be read: {why}") for name, why in self.photos.unreadable.items()]
-        common = sorted(self.numbers[number] for number in posed), sorted(left_out, key=lambda photo: photo.name)
-        registered, unposed = map(tuple, common)
+        unposed = tuple(sorted(left_out, key=lambda photo: photo.name))
+        registered = tuple(sorted(self.numbers[number] for number in posed))
         if not models:
             return Posing(self.workspace.folder, registered, unposed, seconds=self._seconds)
         model = models[0]

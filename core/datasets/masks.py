@@ -54,7 +54,7 @@ def read_mask(path: Path, name: str, lens: Lens, size_px: tuple[int, int]) -> np
 def _undistorted(black: np.ndarray, lens: Lens) -> np.ndarray:
     if lens.distortion.is_none:
         return black
-    return black.ravel()[seen_pixels(lens)].any(0)
+    return np.logical_or.reduce([black.ravel()[index] for index in seen_pixels(lens)])
 
 
 def _covered(black: np.ndarray, size_px: tuple[int, int]) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Photos freed of their lens distortion, by looking up where each pinhole pixel was seen."""
 
+from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -31,16 +32,19 @@ def undistorted(image_u8: np.ndarray, lens: Lens) -> np.ndarray:
     return result
 
 
-def seen_pixels(lens: Lens) -> np.ndarray:
-    """[4, h, w] int32: the flat indices of the photo's pixels that each pixel of the undistorted photo is mixed of.
+def seen_pixels(lens: Lens) -> Iterator[np.ndarray]:
+    """Four times [h, w] int32: flat indices of the photo's pixels that each pixel of the undistorted photo is mixed of.
 
-    A pixel whose share is zero counts as one of the others.
+    A pixel whose share is zero is replaced by another of the four.
     """
     index, share_x, share_y = _lookup(lens)
     width, height = lens.size_px
     right = np.minimum((share_x > 0).astype(np.int32), width - 1 - index % width)
     down = np.minimum((share_y > 0).astype(np.int32), height - 1 - index // width) * width
-    return np.stack([index, index + right, index + down, index + right + down])
+    yield index
+    yield index + right
+    yield index + down
+    yield index + right + down
 
 
 @lru_cache(maxsize=4)

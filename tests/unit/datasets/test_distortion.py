@@ -23,6 +23,12 @@ mild = st.builds(
     k4=st.floats(-0.002, 0.002),
     p1=st.floats(-0.01, 0.01),
     p2=st.floats(-0.01, 0.01),
+    d1=st.sampled_from([0.0, 0.05, -0.05]),
+    d2=st.floats(-0.01, 0.01),
+    d3=st.sampled_from([0.0, 0.003]),
+    s1=st.floats(-0.01, 0.01),
+    s2=st.floats(-0.01, 0.01),
+    fisheye=st.booleans(),
 )
 
 
@@ -78,6 +84,19 @@ def test_every_pixel_of_the_pinhole_photo_was_seen(distortion, width, height):
     assert (seen.max((0, 1)) < np.array([width, height]) - 0.5 + 0.05).all()
 
 
+@pytest.mark.parametrize("focal", [20.0, 26.0, 40.0])
+def test_fisheye_photo_is_cut_at_55_degrees(focal):
+    # A circular fisheye: 80 px across, of 230, 176 and 115 degrees.
+    pinhole = Lens((focal, focal), (40.0, 40.0), (80, 80), Distortion(fisheye=True)).pinhole
+    reach = np.degrees(np.arctan(pinhole.size_px[0] / 2 / focal))
+    assert reach == pytest.approx(55, abs=2)
+
+
+def test_fisheye_photo_of_a_narrow_lens_is_kept_whole():
+    lens = Lens((100.0, 100.0), (40.0, 30.0), (80, 60), Distortion(k1=-0.01, fisheye=True))
+    assert lens.pinhole.size_px[0] >= 80
+
+
 def test_pinhole_frame_is_as_large_as_it_can_be():
     lens = Lens((60.0, 60.0), (40.0, 30.0), (80, 60), Distortion(k1=-0.1))
     pinhole = lens.pinhole
@@ -92,7 +111,16 @@ def wave(points):
     return 127 + 100 * np.stack([np.sin(9 * x), np.cos(8 * y), np.sin(6 * (x + y))], -1)
 
 
-@pytest.mark.parametrize("distortion", [FOX, Distortion(k1=-0.2, k2=0.03), Distortion(k1=0.15, p1=0.01, p2=-0.008)])
+@pytest.mark.parametrize(
+    "distortion",
+    [
+        FOX,
+        Distortion(k1=-0.2, k2=0.03),
+        Distortion(k1=0.15, p1=0.01, p2=-0.008),
+        Distortion(k1=0.1, d1=0.15, s1=0.01),
+        Distortion(k1=-0.05, k4=0.01, fisheye=True),
+    ],
+)
 def test_undistorted_photo_shows_what_a_pinhole_sees(distortion):
     lens = Lens((150.0, 148.0), (80.3, 59.1), (160, 120), distortion)
     x, y = np.meshgrid(np.arange(160) + 0.5, np.arange(120) + 0.5)

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from core.datasets import check_capture, read_capture
+from core.datasets.distortion import Distortion
 from core.errors import (
     ImageMissing,
     ImageSizeMismatch,
@@ -19,6 +20,12 @@ def test_shared_intrinsics_are_read(tmp_path):
     camera = capture.train[0].camera
     assert (camera.focal_px, camera.centre_px, camera.size_px) == ((10.0, 11.0), (4.25, 2.75), (8, 6))
     np.testing.assert_allclose(pose_in_user_frame(capture.user_from_object, camera), pose(1), atol=1e-12)
+
+
+@pytest.mark.parametrize("fields", [{"camera_model": "OPENCV_FISHEYE"}, {"is_fisheye": True}])
+def test_fisheye_lenses_are_read(tmp_path, fields):
+    lens = check_capture(nerfstudio(tmp_path, k1=0.01, k4=0.002, p1=0.5, **fields)).train[0].lens
+    assert lens.distortion == Distortion(k1=0.01, k4=0.002, fisheye=True)
 
 
 def test_every_eighth_photo_by_name_is_held_out(tmp_path):

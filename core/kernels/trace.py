@@ -166,6 +166,13 @@ def plane_distance(value: float, slope: float):
 
 
 @wp.func
+def side_distance(slope: float, o: wp.vec3, d: wp.vec3, axis: int):
+    """t where a ray crosses the plane x_axis = slope z of tapered cells; FAR where that is not before the cameras."""
+    t = plane_distance(o[axis] - slope * o[2], d[axis] - slope * d[2])
+    return wp.where(o[2] + t * d[2] < 0.5, float(FAR), t)  # the cells begin at z = 1; behind 0 the plane goes on
+
+
+@wp.func
 def side_coordinate(way: float, cell: int, reach: int, size: float):
     """Where, along one axis of the cells' cube, the far side lies of the block of cells less than `reach` from one."""
     return float(wp.where(way > 0.0, cell + reach, cell - reach + 1)) * size - 1.0
@@ -178,12 +185,10 @@ def block_exit(space: Space, o: wp.vec3, d: wp.vec3, way: wp.vec3, cell: wp.vec3
     y = side_coordinate(way[1], cell[1], reach, size)
     z = side_coordinate(way[2], cell[2], reach, size)
     if space.kind == TAPER:
-        u = x * space.tangent[0]
-        v = y * space.tangent[1]
         depth = wp.exp(space.growth * (z + 1.0) * 0.5)
         return wp.vec3(
-            plane_distance(o[0] - u * o[2], d[0] - u * d[2]),
-            plane_distance(o[1] - v * o[2], d[1] - v * d[2]),
+            side_distance(x * space.tangent[0], o, d, 0),
+            side_distance(y * space.tangent[1], o, d, 1),
             plane_distance(o[2] - depth, d[2]),
         )
     return wp.vec3(plane_distance(o[0] - x, d[0]), plane_distance(o[1] - y, d[1]), plane_distance(o[2] - z, d[2]))

@@ -6,6 +6,7 @@ import numpy as np
 import torch
 import warp as wp
 
+from core.field.space import Space
 from core.kernels.surfaces import Texels
 from core.kernels.types import vec8
 from core.mesh.quad_mesh import VERTEX_REACH, QuadMesh, build_mesh
@@ -13,11 +14,20 @@ from core.mesh.quad_mesh import VERTEX_REACH, QuadMesh, build_mesh
 WIDTH = 2.0
 
 
-def mesh_of(rng: np.random.Generator, cells: int, solid: np.ndarray, spread: float = VERTEX_REACH, device="cpu"):
+def mesh_of(
+    rng: np.random.Generator,
+    cells: int,
+    solid: np.ndarray,
+    spread: float = VERTEX_REACH,
+    device: str = "cpu",
+    space: Space | None = None,
+    shells: np.ndarray | None = None,
+) -> QuadMesh:
     """The mesh between solid cells, its vertices moved by up to `spread` cells along each axis."""
     ticks = (np.arange(cells) + 0.5) * (WIDTH / cells) - 1.0
     centres = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), -1)
-    return build_mesh(solid, centres + rng.uniform(-spread, spread, centres.shape) * (WIDTH / cells), device)
+    moved = centres + rng.uniform(-spread, spread, centres.shape) * (WIDTH / cells)
+    return build_mesh(solid, moved, device, space, shells)
 
 
 def random_mesh(rng: np.random.Generator, cells: int = 7, share: float = 0.8, device: str = "cpu") -> QuadMesh:

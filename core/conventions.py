@@ -1,7 +1,9 @@
 """Axes, pixels, colours and feature coding: the one place where they are decided.
 
-Object frame    the capture's own frame, right-handed, metres where the capture is metric. Every vertex, camera and view
-                direction is in it. `asset_from_object` places it in glTF's frame (right-handed, +y up).
+User frame      that of the capture's files, right-handed; any size, place and (LLFF, COLMAP) orientation.
+Object frame    the user's frame, normalised (core/normalisation.py): +z up, origin at what the cameras look at, median
+                camera distance 1. Every vertex, camera and view direction is in it. `asset_from_object` places it in
+                glTF's frame (right-handed, +y up), `user_from_object` leads back to the user's.
 Camera frame    OpenGL's and glTF's: +x right, +y up, looking along -z.
 Pixel           (0, 0) is the top left pixel; its centre is at (0.5, 0.5).
 Colour          sRGB-encoded, [0, 1], exactly as in the photos. The network outputs it; nothing is linearised.

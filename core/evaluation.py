@@ -55,17 +55,23 @@ def evaluate(
 ) -> Evaluation:
     """Renders every view as the product shows it (deferred, 8 bit) and compares it with the photo.
 
-    Both are over the scene's background. `progress` is told the stage "measure", the fraction of the views (a caller
+    Both are over the scene's background. Pixels that a mask takes out do not count, and a photo that has no others is
+    passed over. `progress` is told the stage "measure", the fraction of the views (a caller
     with more to do rescales it) and the mean PSNR so far.
     """
     rasteriser = Rasteriser(scene, device)
     scores: list[ViewScore] = []
-    for view in views:
-        rendered = _rendered(rasteriser, view.camera) / 255.0
-        photo = view.over(scene.background)
-        scores.append(ViewScore(view.camera.name, psnr(photo, rendered), ssim(photo, rendered)))
-        progress(Progress("measure", len(scores) / len(views), Evaluation(tuple(scores)).psnr))
+    for done, view in enumerate(views, start=1):
+        if view.ignored is None or not view.ignored.all():
+            scores.append(_score(rasteriser, view))
+        progress(Progress("measure", done / len(views), Evaluation(tuple(scores)).psnr))
     return Evaluation(tuple(scores))
+
+
+def _score(rasteriser: Rasteriser, view: View) -> ViewScore:
+    photo, rendered = view.over(rasteriser.scene.background), _rendered(rasteriser, view.camera) / 255.0
+    images = (photo, rendered, view.ignored)
+    return ViewScore(view.camera.name, psnr(*images), ssim(*images))
 
 
 def comparison_picture(scene: BakedScene, view: View, *, device: str = "cpu") -> np.ndarray:

@@ -50,6 +50,22 @@ def test_score_is_of_the_eight_bit_picture(scene):
     assert evaluate(scene, [view]).psnr == pytest.approx(psnr(np.full_like(rendered, 128 / 255), rendered), abs=1e-4)
 
 
+def test_ignored_pixels_are_not_measured(scene):
+    view = photo_of(scene, scene.cameras[0])
+    spoilt, ignored = view.image_u8.copy(), np.zeros(view.image_u8.shape[:2], bool)
+    spoilt[10:30, 30:60] ^= 128
+    ignored[10:30, 30:60] = True
+    result = evaluate(scene, [replace(view, image_u8=spoilt, ignored=ignored)])
+    assert result.psnr > 80
+    assert result.ssim > 0.99999
+
+
+def test_photo_that_is_ignored_entirely_has_no_score(scene):
+    view = photo_of(scene, scene.cameras[0])
+    nothing = replace(view, ignored=np.ones(view.image_u8.shape[:2], bool))
+    assert len(evaluate(scene, [nothing, view]).views) == 1
+
+
 def test_progress_tells_every_view(scene):
     reports = []
     evaluate(scene, [photo_of(scene, camera) for camera in scene.cameras], progress=reports.append)

@@ -27,6 +27,24 @@ def test_psnr_takes_the_mean_over_pixels_and_channels():
     assert psnr(error, np.zeros((2, 2, 3))) == pytest.approx(10 * np.log10(12), abs=EXACT)
 
 
+def test_psnr_is_over_the_pixels_that_count(rng):
+    image, ignored = rng.uniform(0, 0.9, (6, 5, 3)), rng.random((6, 5)) < 0.5
+    other = np.where(ignored[..., None], 0, image + 0.1)
+    assert psnr(image, other, ignored) == pytest.approx(20.0, abs=1e-9)
+    nothing = np.zeros((6, 5), bool)
+    assert psnr(image, other, nothing) == psnr(image, other)
+
+
+@pytest.mark.parametrize("shape", [(20, 30, 3), (20, 30), (8, 30, 3), (12, 15)])
+def test_ssim_is_over_the_windows_whose_centres_count(rng, shape):
+    image, other = rng.random(shape), rng.random(shape)
+    half = np.zeros(shape[:2], bool)
+    half[:, shape[1] // 2 :] = True
+    assert ssim(image, other, half) < ssim(image, np.where(half if image.ndim == 2 else half[..., None], image, other))
+    assert ssim(image, other, np.zeros(shape[:2], bool)) == pytest.approx(ssim(image, other), abs=EXACT)
+    assert ssim(image, other, np.ones(shape[:2], bool)) == 1.0
+
+
 def test_ssim_of_equal_images_is_one(rng):
     image = rng.random((20, 30, 3))
     assert ssim(image, image) == 1.0

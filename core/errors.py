@@ -24,6 +24,7 @@ PolyfieldError
 |  `- AssetInvalid           asset-invalid           a .glb that cannot be read back
 |- SceneInvalid              scene-invalid           a BakedScene that breaks its own rules
 |- CheckpointInvalid         checkpoint-invalid
+|- PosingFailed              posing-failed           COLMAP crashed, again and again
 `- TrainingFailed            training-failed         diverged, or the field came out empty
 """
 
@@ -146,6 +147,10 @@ class SceneInvalid(PolyfieldError):
 
 class CheckpointInvalid(PolyfieldError):
     code = "checkpoint-invalid"
+
+
+class PosingFailed(PolyfieldError):
+    code = "posing-failed"
 
 
 class TrainingFailed(PolyfieldError):

@@ -16,6 +16,7 @@ from core.capture_report import (
 from core.capture_report.convention import ESTIMATED, convention_of
 from core.capture_report.expectation import expected
 from core.datasets import photos_without_poses, read_capture
+from core.posing.pose_photos import pose_photos
 from core.posing.posing import Posing
 from core.presets import Settings
 from service.artifacts import CAPTURE_JSON, CAPTURE_PICTURE
@@ -76,8 +77,6 @@ class Preparation:
         """
         if photos_without_poses(source) is None:
             return None
-        from core.posing.structure_from_motion import pose_photos  # late, because it loads COLMAP
-
         posing = pose_photos(source, self.posing_dir, progress=stages.posing(), seed=self.seed)
         stages.add(posing.seconds)
         if not posing.is_usable:

@@ -2,6 +2,6 @@
 
     photos -> features (SIFT) -> matches of pairs that overlap -> cameras and points, one photo after another
 
-`structure_from_motion.pose_photos` is all of it. The model is left in COLMAP's own format, which `core.datasets` reads
-like anybody's. `photo_set` and `posing`, which the server needs, do without pycolmap.
+`pose_photos.pose_photos` is all of it. The model is left in COLMAP's own format, which `core.datasets` reads
+like anybody's. It runs in a process of its own: only `structure_from_motion` and what it uses import pycolmap.
 """

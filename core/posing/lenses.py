@@ -10,9 +10,8 @@ import math
 from dataclasses import dataclass
 
 import pycolmap
-from PIL import Image
 
-from core.images import read_exif, read_size
+from core.posing.headers import Header
 from core.posing.photo_set import PhotoSet
 
 DIAGONAL_35MM = math.hypot(36.0, 24.0)
@@ -21,33 +20,6 @@ DEFAULT_FOCAL_FACTOR = 1.2
 # One radial coefficient is what few photos can tell; with many, both radial and the tangential ones.
 FEW_PHOTOS = 10
 FEW_MODEL, MANY_MODEL = "SIMPLE_RADIAL", "OPENCV"
-
-TAG_MAKE, TAG_MODEL, TAG_ORIENTATION, EXIF_IFD = 0x010F, 0x0110, 0x0112, 0x8769
-TAG_FOCAL_MM, TAG_FOCAL_35MM = 0x920A, 0xA405
-
-
-@dataclass(frozen=True)
-class Header:
-    """What a photo's file tells before it is decoded.
-
-    Attributes:
-        stored_px: (width, height) as stored.
-        orientation: EXIF's, 1 to 8; 1 is upright.
-        camera: make and model; "" if not told.
-        focal_mm, focal_35mm: of the lens, and as if on 35 mm film; 0 if not told.
-    """
-
-    stored_px: tuple[int, int]
-    orientation: int
-    camera: str
-    focal_mm: float
-    focal_35mm: float
-
-    @property
-    def size_px(self) -> tuple[int, int]:
-        """(width, height) of the upright photo."""
-        width, height = self.stored_px
-        return (height, width) if self.orientation >= 5 else (width, height)
 
 
 @dataclass(frozen=True)
@@ -72,11 +44,6 @@ class SharedLens:
         return MANY_MODEL if len(self.names) >= FEW_PHOTOS else FEW_MODEL
 
 
-def read_headers(photos: PhotoSet) -> dict[str, Header]:
-    """The headers of all readable photos, by name."""
-    return {name: _header(photos, name) for name in photos.names}
-
-
 def shared_lenses(photos: PhotoSet, headers: dict[str, Header]) -> list[SharedLens]:
     """The lenses of a set, in the order of their first photos."""
     groups: dict[tuple[object, ...], list[str]] = {}
@@ -90,36 +57,6 @@ def _lens(photos: PhotoSet, names: tuple[str, ...], header: Header) -> SharedLen
     focal_px = _focal_px(header) or _focal_of_sensor(photos, names[0], header)
     guess = DEFAULT_FOCAL_FACTOR * max(header.size_px)
     return SharedLens(names, header.size_px, focal_px or guess, focal_known=focal_px is not None)
-
-
-def _header(photos: PhotoSet, name: str) -> Header:
-    path = photos.path(name)
-    exif = read_exif(path, name)
-    lens = _ifd(exif)
-    camera = " ".join(str(exif.get(tag, "")).strip("\0 ") for tag in (TAG_MAKE, TAG_MODEL)).strip()
-    orientation = exif.get(TAG_ORIENTATION, 1)
-    return Header(
-        read_size(path, name),
-        orientation if isinstance(orientation, int) and 1 <= orientation <= 8 else 1,
-        camera,
-        _length(lens.get(TAG_FOCAL_MM)),
-        _length(lens.get(TAG_FOCAL_35MM)),
-    )
-
-
-def _ifd(exif: Image.Exif) -> dict[int, object]:
-    try:
-        return dict(exif.get_ifd(EXIF_IFD))
-    except Exception:  # parsers raise anything on hostile bytes
-        return {}
-
-
-def _length(value: object) -> float:
-    try:
-        length = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, ZeroDivisionError):
-        return 0.0
-    return length if math.isfinite(length) and 0 < length < 5000 else 0.0
 
 
 def _focal_px(header: Header) -> float | None:

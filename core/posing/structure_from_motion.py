@@ -10,13 +10,14 @@ from pathlib import Path
 import pycolmap
 
 from core.posing.features import write_cameras, write_features
-from core.posing.lenses import read_headers, shared_lenses
+from core.posing.headers import read_headers
+from core.posing.lenses import shared_lenses
 from core.posing.mapping import mapped, write_model
 from core.posing.matching import write_matches
 from core.posing.pairs import pairs_to_match
 from core.posing.photo_set import PhotoSet, find_photo_set
 from core.posing.posing import LeftOut, Posing
-from core.posing.workspace import Workspace, identity_of
+from core.posing.workspace import Workspace, identity_of, own_folder
 from core.progress import Progress, ProgressCallback, ignore_progress
 
 # The stages' shares of the time, for the progress bar: 50 photos, two cores.
@@ -26,46 +27,24 @@ UNPOSED = "whose matches fit no pose among the others"
 APART = "that could only be posed apart from the others"
 
 
-def pose_photos(
+def posed_in_this_process(
     photos_folder: Path, work_folder: Path, *, progress: ProgressCallback = ignore_progress, seed: int = 0
 ) -> Posing:
-    """Estimates the cameras of photos. A finished posing of the same photos is returned as it is.
-
-    Interrupted, however it was, it goes on with the features and matches that it had; the mapper starts again. With the
-    same seed on the same machine, features, pairs and matches are the same; cameras agree to a small part of a pixel,
-    because the mapper's threads add numbers in any order.
-
-    Args:
-        photos_folder: photos anywhere below; see `find_photo_set`.
-        work_folder: is made; gets what `Workspace` says. `core.datasets.read_capture` reads it afterwards.
-        progress: is told stage (features, matching, mapping) and fraction of the posing.
-
-    Returns:
-        The outcome, also where too few photos could be posed: ask `Posing.require_usable`.
-
-    Raises:
-        NoImages, TooFewImages
-    """
+    """What `pose_photos` does, in this process: COLMAP takes over the signal handlers, and may crash."""
     photos_folder, work_folder = Path(photos_folder).absolute(), Path(work_folder).absolute()
-    photos = find_photo_set(photos_folder, without=_own(work_folder, photos_folder))
+    photos = find_photo_set(photos_folder, without=own_folder(work_folder, photos_folder))
     headers = read_headers(photos)
     workspace = Workspace(work_folder)
     workspace.claim(identity_of(photos, seed=seed))
     workspace.link_photos(photos, headers)
     if (posing := workspace.outcome()) is None:
-        pycolmap.logging.minloglevel = int(pycolmap.logging.Level.ERROR)  # its log has hundreds of lines a photo
+        pycolmap.logging.minloglevel = int(pycolmap.logging.Level.FATAL)  # refusals are ours to word
         lenses = shared_lenses(photos, headers)
         numbers = dict(enumerate(photos.names, start=1))
         write_cameras(workspace.database, lenses, numbers)
         posing = _Run(photos, numbers, workspace, seed, progress).posing()
         workspace.finish(posing)
     return posing
-
-
-def _own(work_folder: Path, photos_folder: Path) -> Path:
-    """What is ours where people want the results beside the photos: pictures in there are not photos."""
-    results = work_folder.parent
-    return results if photos_folder in results.parents else work_folder
 
 
 class _Run:

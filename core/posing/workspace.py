@@ -20,7 +20,7 @@ from typing import Any
 from PIL import Image, ImageOps
 
 from core.images import FORMATS
-from core.posing.lenses import Header
+from core.posing.headers import Header
 from core.posing.photo_set import PhotoSet
 from core.posing.posing import Posing, read_json
 
@@ -99,6 +99,12 @@ def identity_of(photos: PhotoSet, **settings: object) -> dict[str, Any]:
             digest.update(f"{name}\n".encode())
             digest.update(hashlib.file_digest(file, "sha256").digest())
     return {"format": FORMAT, "photos": digest.hexdigest(), **settings}
+
+
+def own_folder(work_folder: Path, photos_folder: Path) -> Path:
+    """What is ours where people want the results beside the photos: pictures in there are not photos."""
+    results = work_folder.parent
+    return results if photos_folder in results.parents else work_folder
 
 
 def _link(source: Path, target: Path) -> None:

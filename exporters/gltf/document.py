@@ -48,7 +48,7 @@ class Document:
     @classmethod
     def of_glb(cls, data: bytes) -> "Document":
         """Of a .glb: everything is within."""
-        text, binary = _chunks(data)
+        text, binary = chunks(data)
         return cls(text, binary, {})
 
     @classmethod
@@ -78,7 +78,7 @@ class Document:
         subject = f"bufferViews[{index}]"
         if view.get("buffer") != 0 or "byteStride" in view:
             raise invalid(subject, "must lie unstrided in buffer 0", str(view)[:80])
-        return _slice(memoryview(self._buffer()), view.get("byteOffset", 0), view.get("byteLength"), subject)
+        return _slice(memoryview(self.buffer()), view.get("byteOffset", 0), view.get("byteLength"), subject)
 
     def accessor(self, index: Any, width: str, components: tuple[int, ...]) -> np.ndarray:
         """[count, n] (or [count] for SCALAR) of an accessor whose type and component type must be as given."""
@@ -101,7 +101,8 @@ class Document:
         image = self.item("images", self.item("textures", texture).get("source"))
         return self._file(image["uri"]) if "uri" in image else bytes(self.view_bytes(image.get("bufferView")))
 
-    def _buffer(self) -> bytes:
+    def buffer(self) -> bytes:
+        """Of buffer 0, which is the only one that is read."""
         buffer = self.item("buffers", 0)
         if "uri" in buffer:
             return self._file(buffer["uri"])
@@ -117,7 +118,7 @@ class Document:
         return self.files[name]
 
 
-def _chunks(data: bytes) -> tuple[bytes, bytes]:
+def chunks(data: bytes) -> tuple[bytes, bytes]:
     """(JSON chunk, binary chunk) of a .glb (glTF 2.0 specification, section 4)."""
     if len(data) < _HEADER.size:
         raise invalid("file", "must be a binary glTF file", f"{len(data)} bytes")

@@ -50,30 +50,32 @@ def read_shaders(data: bytes) -> dict[str, ShaderSources]:
         AssetInvalid
     """
     with only_asset_invalid(extension.NAME):
-        return extension.shaders_from_json(_network(_root_extension(Document.of_glb(data))))
+        return extension.shaders_from_json(the_network(root_extension(Document.of_glb(data))))
 
 
 def _scene(document: Document) -> BakedScene:
-    root = _root_extension(document)
+    root = root_extension(document)
     return BakedScene(
         pages=_pages(document),
-        network=extension.network_from_json(_network(root)),
-        background=_background(root),
-        asset_from_object=_asset_from_object(document),
-        cameras=_cameras(document, root),
-        user_from_object=_user_from_object(root),
+        network=extension.network_from_json(the_network(root)),
+        background=background_of(root),
+        asset_from_object=asset_from_object(document),
+        cameras=cameras_of(document, root),
+        user_from_object=user_from_object(root),
         start_camera=root.get("startView"),
     )
 
 
-def _root_extension(document: Document) -> dict[str, Any]:
+def root_extension(document: Document) -> dict[str, Any]:
+    """The extension's object of the glTF root."""
     root: dict[str, Any] | None = document.json.get("extensions", {}).get(extension.NAME)
     if root is None:
         raise invalid("file", f"must have the extension {extension.NAME}", "a glTF file without it")
     return root
 
 
-def _network(root: dict[str, Any]) -> dict[str, Any]:
+def the_network(root: dict[str, Any]) -> dict[str, Any]:
+    """JSON of the network, of which there must be one."""
     networks = root["networks"]
     if len(networks) != 1:
         raise invalid("networks", "must be exactly one", str(len(networks)))
@@ -81,41 +83,44 @@ def _network(root: dict[str, Any]) -> dict[str, Any]:
     return network
 
 
-def _background(root: dict[str, Any]) -> tuple[float, float, float]:
+def background_of(root: dict[str, Any]) -> tuple[float, float, float]:
+    """sRGB; white where the file does not say."""
     red, green, blue = numbers(root.get("background", _WHITE), "background").tolist()
     return red, green, blue
 
 
-def _asset_from_object(document: Document) -> np.ndarray:
+def asset_from_object(document: Document) -> np.ndarray:
     """The transform of the scene's root node, the object."""
     (root,) = document.item("scenes", document.json.get("scene", 0))["nodes"]
     return node_matrix(document.item("nodes", root), "object node")
 
 
-def _user_from_object(root: dict[str, Any]) -> np.ndarray:
+def user_from_object(root: dict[str, Any]) -> np.ndarray:
     """Files from before the property was there are in the user's frame."""
     if "userFromObject" not in root:
         return np.eye(4)
     return matrix_from_column_major(root["userFromObject"], "userFromObject")
 
 
-def _cameras(document: Document, root: dict[str, Any]) -> tuple[Camera, ...]:
+def cameras_of(document: Document, root: dict[str, Any]) -> tuple[Camera, ...]:
+    """The extension's views, named by their nodes."""
     views = root.get("views", [])
     return tuple(extension.view_from_json(v, str(document.item("nodes", v["node"]).get("name", ""))) for v in views)
 
 
 def _pages(document: Document) -> tuple[Page, ...]:
-    """One page per primitive with the extension, in the order of the meshes."""
-    found = []
-    for mesh in document.json.get("meshes", []):
-        for primitive in mesh["primitives"]:
-            if extension.NAME in primitive.get("extensions", {}):
-                found.append((primitive, _page_pngs(document, primitive)))
+    found = [(primitive, page_pngs(document, primitive)) for primitive in neural_primitives(document)]
     check_size((png_size(pngs[0], "feature texture") for _, pngs in found), AssetInvalid)
     return tuple(_page(document, primitive, pngs) for primitive, pngs in found)
 
 
-def _page_pngs(document: Document, primitive: dict[str, Any]) -> list[bytes]:
+def neural_primitives(document: Document) -> list[dict[str, Any]]:
+    """The primitives with the extension, one per page, in the order of the meshes."""
+    primitives = [primitive for mesh in document.json.get("meshes", []) for primitive in mesh["primitives"]]
+    return [primitive for primitive in primitives if extension.NAME in primitive.get("extensions", {})]
+
+
+def page_pngs(document: Document, primitive: dict[str, Any]) -> list[bytes]:
     """The PNG files of features 0-3, features 4-7 and the fallback colour; equal sizes, nothing decoded yet."""
     neural = primitive["extensions"][extension.NAME]
     if neural["coding"] != extension.CODING or neural["network"] != 0:
@@ -135,13 +140,16 @@ def _page(document: Document, primitive: dict[str, Any], pngs: list[bytes]) -> P
     features_u8 = np.concatenate([features0, features1], -1)
     if not np.array_equal(color[..., 3] > 0, is_opaque(features_u8)):
         raise invalid("page's textures", "must agree on where holes are", "a fallback with other holes")
+    return Page(features_u8, np.ascontiguousarray(color[..., :3]), *mesh_of(document, primitive))
+
+
+def mesh_of(document: Document, primitive: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(positions float32 [V, 3], texcoords float32 [V, 2], triangles uint32 [T, 3]); indices are not checked yet."""
     if primitive.get("mode", 4) != 4:
         raise invalid("primitive", "must be of triangles", f"mode {str(primitive['mode'])[:20]}")
     attributes = primitive["attributes"]
     indices = document.accessor(primitive["indices"], "SCALAR", _INDEX)
-    return Page(
-        features_u8,
-        np.ascontiguousarray(color[..., :3]),
+    return (
         document.accessor(attributes["POSITION"], "VEC3", _FLOAT).astype(np.float32),
         document.accessor(attributes["TEXCOORD_0"], "VEC2", _FLOAT).astype(np.float32),
         indices.astype(np.uint32).reshape(-1, 3),

@@ -14,10 +14,14 @@ class Blocked:
             raise ImportError(f"{name} is blocked")
 
 sys.meta_path.insert(0, Blocked())
-from exporters.gltf import read_glb, read_shaders, write_glb
+from exporters.check import check_glb
+from exporters.gltf import read_glb, read_gltf, read_shaders, write_glb, write_gltf
+from exporters.mobilenerf import read_mobilenerf, write_mobilenerf
 from tests.scenes import tiny_scene
 
 glb = write_glb(tiny_scene())["scene.glb"]
+assert [finding.severity for finding in check_glb(glb)] == ["note"]
+assert read_gltf(write_gltf(tiny_scene())).quad_count == read_mobilenerf(write_mobilenerf(tiny_scene())).quad_count
 print(read_glb(glb).quad_count, *sorted(read_shaders(glb)))
 """
 

@@ -10,7 +10,7 @@ from core.baked import BakedScene, Page, similarity_scale
 from core.conventions import is_opaque
 from core.errors import SceneInvalid
 from exporters.gltf import extension
-from exporters.gltf.blob import Blob
+from exporters.gltf.blob import Blob, glb_bytes
 from exporters.gltf.cameras import camera_json
 from exporters.gltf.placement import nearest_rotation, trs
 from exporters.limits import check_size
@@ -40,8 +40,8 @@ def write_glb(scene: BakedScene) -> dict[str, bytes]:
         return gltf.Image(name=name, mimeType="image/png", bufferView=blob.append(png))
 
     document = _document(scene, blob, within)
-    document.set_binary_blob(bytes(blob.data))
-    return {FILE_NAME: b"".join(document.save_to_bytes())}
+    text = document.gltf_to_json(separators=(",", ":"), indent=None).encode()
+    return {FILE_NAME: glb_bytes(text, blob)}
 
 
 def write_gltf(scene: BakedScene) -> dict[str, bytes]:
@@ -61,7 +61,7 @@ def write_gltf(scene: BakedScene) -> dict[str, bytes]:
 
     document = _document(scene, blob, beside)
     document.buffers[0].uri = BUFFER_NAME
-    return {GLTF_NAME: document.gltf_to_json().encode(), BUFFER_NAME: bytes(blob.data), **files}
+    return {GLTF_NAME: document.gltf_to_json().encode(), BUFFER_NAME: b"".join(blob.parts), **files}
 
 
 def _document(scene: BakedScene, blob: Blob, image: ImageStore) -> gltf.GLTF2:
@@ -73,7 +73,7 @@ def _document(scene: BakedScene, blob: Blob, image: ImageStore) -> gltf.GLTF2:
     _add_object_node(document, scene)
     document.extensions = {extension.NAME: _root(scene, views)}
     document.bufferViews = blob.views
-    document.buffers = [gltf.Buffer(byteLength=len(blob.data))]
+    document.buffers = [gltf.Buffer(byteLength=blob.length)]
     return document
 
 

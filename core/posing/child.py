@@ -1,4 +1,4 @@
-"""`python -m core.posing.child PHOTOS WORK SEED`: see pose_photos. Its progress goes to stdout, a JSON object a line."""
+"""`python -m core.posing.child PHOTOS WORK SEED`: see pose_photos. Progress goes to stdout, a JSON object a line."""
 
 from __future__ import annotations
 

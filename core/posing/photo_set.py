@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from core.datasets import photos_without_poses
+from core.datasets.masks import FOLDER as MASKS
 from core.errors import InputError, NoImages, TooFewImages
 from core.images import SUFFIXES, read_size
 
@@ -23,11 +24,13 @@ class PhotoSet:
         folder: they are named relative to it.
         names: POSIX paths, sorted: the order in which they were taken, for most cameras.
         unreadable: names of photos that cannot be used, with the reason.
+        masks: folder of masks named after the photos, if there is one.
     """
 
     folder: Path
     names: tuple[str, ...]
     unreadable: dict[str, str]
+    masks: Path | None = None
 
     def path(self, name: str) -> Path:
         return self.folder / name
@@ -46,6 +49,7 @@ def find_photo_set(folder: Path, *, without: Path | None = None) -> PhotoSet:
         NoImages, TooFewImages
     """
     names = sorted(name for name in _names_below(folder) if not (without and (folder / name).is_relative_to(without)))
+    top = folder
     inner = os.path.commonpath([name.rpartition("/")[0] for name in names]) if names else ""
     if inner:
         folder, names = folder / inner, [name[len(inner) + 1 :] for name in names]
@@ -57,7 +61,8 @@ def find_photo_set(folder: Path, *, without: Path | None = None) -> PhotoSet:
             unreadable[name] = error.received or error.rule
     readable = tuple(name for name in names if name not in unreadable)
     _check_count(names, readable)
-    return PhotoSet(folder, readable, unreadable)
+    masks = next((path for path in (folder / MASKS, folder.parent / MASKS, top / MASKS) if path.is_dir()), None)
+    return PhotoSet(folder, readable, unreadable, masks if masks and masks.is_relative_to(top) else None)
 
 
 def _names_below(folder: Path) -> list[str]:

@@ -1,5 +1,6 @@
 """The folder that posing works in. A run that was stopped, however it was, goes on from what lies there.
 
+masks            a link to the photos' masks, if there are any
 images/          links to the photos; upright copies of those that are stored lying on a side
 database.db      COLMAP's: features and matches, each written when it is found; gone when posing is done
 sparse/0/        the model
@@ -19,6 +20,7 @@ from typing import Any
 
 from PIL import Image, ImageOps
 
+from core.datasets.masks import FOLDER as MASKS
 from core.images import FORMATS
 from core.posing.headers import Header
 from core.posing.photo_set import PhotoSet
@@ -73,11 +75,13 @@ class Workspace:
             if turned and (target.exists() or _write_upright(photos.path(name), target)):
                 continue
             _link(photos.path(name).resolve(), target)
+        if photos.masks:
+            _link(photos.masks.resolve(), self.folder / MASKS)
 
     def _clear(self) -> None:
         for path in (self.images, self.folder / "sparse"):
             shutil.rmtree(path, ignore_errors=True)
-        for name in ("posing.json", "identity.json"):
+        for name in ("posing.json", "identity.json", MASKS):
             (self.folder / name).unlink(missing_ok=True)
         self._remove_database()
 

@@ -37,8 +37,8 @@ def _no_images() -> Files:
     return {name: data for name, data in capture_files().items() if name.endswith(".json")}
 
 
-def _no_poses() -> Files:
-    return {name: data for name, data in capture_files().items() if name.endswith(".png")}
+def _two_photos() -> Files:
+    return {name: data for name, data in capture_files(train=2, test=0).items() if name.endswith(".png")}
 
 
 def _missing_image() -> Files:
@@ -97,7 +97,7 @@ def _transparent() -> Files:
 
 BAD_INPUTS = {
     "no images": BadInput(_no_images, "no-images", 422, ("photos",)),
-    "no poses": BadInput(_no_poses, "poses-missing", 422, ("transforms.json",)),
+    "two photos without poses": BadInput(_two_photos, "too-few-images", 422, ("at least 3", "2 of 2")),
     "missing image": BadInput(_missing_image, "image-missing", 422, ("r_3",)),
     "truncated PNG": BadInput(_truncated, "image-undecodable", 422, ("r_3",), decoded=True),
     "text as PNG": BadInput(_text_as_png, "image-undecodable", 422, ("r_3",)),

@@ -31,6 +31,9 @@ def main() -> None:
         sys.exit(1)
     if act == "hang":
         time.sleep(3600)
+    lines = [{"label": "photos", "text": "10: 8 to train on, 2 held out to measure (r_0, r_1)", "warns": False}]
+    write_atomically(folder / "artifacts" / "capture.png", b"png")
+    write_atomically(folder / "artifacts" / "capture.json", json.dumps({"lines": lines}).encode())
     count(folder, SLOW_STEPS if act == "slow" else 4)
     for name, data in (("scene.glb", b"glTF" + bytes(1000)), ("preview.png", b"png"), ("report.json", b"{}")):
         write_atomically(folder / "artifacts" / name, data)

@@ -39,8 +39,17 @@ def report(out: Path) -> Report:
     return Report.from_bytes((out / "report.json").read_bytes())
 
 
-def test_conversion_leaves_its_three_files_and_no_checkpoint(out: Path) -> None:
-    assert {path.name for path in out.iterdir()} == {"scene.glb", "preview.png", "report.json"}
+def test_conversion_leaves_its_files_and_no_checkpoint(out: Path) -> None:
+    names = {path.name for path in out.iterdir()}
+    assert names == {"scene.glb", "preview.png", "report.json", "capture.json", "capture.png"}
+
+
+def test_capture_report_is_part_of_the_report(out: Path, report: Report) -> None:
+    assert json.loads((out / "capture.json").read_bytes()) == report.capture
+    assert report.capture["kind"]["name"] == "object"
+    assert [photo["held_out"] for photo in report.capture["photos"]].count(True) == 2
+    assert {line["label"] for line in report.capture["lines"]} >= {"photos", "format", "scene", "coverage", "expected"}
+    assert Image.open(out / "capture.png").size[0] > 1000
 
 
 def test_figures_are_those_of_the_written_asset(capture: Path, out: Path, report: Report) -> None:

@@ -31,7 +31,8 @@ def test_job_succeeds_and_offers_its_artifacts(running: RunningService, packed: 
     job = running.wait(job_id)
     assert (job["state"], job["problem"], job["fraction"]) == ("succeeded", None, 1.0)
     assert job["options"]["preset"] == "draft"
-    assert {artifact["name"] for artifact in job["artifacts"]} == {"scene.glb", "preview.png", "report.json"}
+    names = {artifact["name"] for artifact in job["artifacts"]}
+    assert names == {"scene.glb", "preview.png", "report.json", "capture.json", "capture.png"}
     assert job["created"] <= job["started"] <= job["ended"]
     assert not folder_of(running, job_id).checkpoint.exists()
     assert len(list(folder_of(running, job_id).capture.rglob("*.png"))) == 10
@@ -40,6 +41,28 @@ def test_job_succeeds_and_offers_its_artifacts(running: RunningService, packed: 
 def test_job_without_a_name_is_named_after_the_archive(running: RunningService) -> None:
     job_id = running.post({"teapot.zip": zipped(capture_files())})
     assert running.job(job_id)["name"] == "teapot"
+    running.client.post(f"/jobs/{job_id}/cancel")
+
+
+def test_photos_without_poses_are_accepted(running: RunningService) -> None:
+    photos = {name: data for name, data in capture_files().items() if name.endswith(".png")}
+    job_id = running.post(photos, name="quick", scene_kind="forward", skip_missing="true")
+    job = running.wait(job_id)
+    assert (job["state"], job["options"]["scene_kind"], job["options"]["skip_missing"]) == (
+        "succeeded",
+        "forward",
+        True,
+    )
+
+
+def test_capture_report_is_there_while_the_job_still_runs(running: RunningService) -> None:
+    job_id = running.post(name="slow")
+    assert running.job(job_id)["capture"] is None or running.job(job_id)["state"] == "running"
+    wait_until(lambda: running.job(job_id)["capture"] is not None)
+    job = running.job(job_id)
+    assert (job["state"], job["capture"]["lines"][0]["label"]) == ("running", "photos")
+    answer = running.client.get(f"/jobs/{job_id}/artifacts/capture.png")
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "image/png")
     running.client.post(f"/jobs/{job_id}/cancel")
 
 

@@ -18,10 +18,15 @@ def test_words_become_values() -> None:
     assert (options.preset, options.seed, options.downscale, options.max_size_px) == ("draft", 7, 2, 400)
     assert options.background == pytest.approx((1.0, 0.0, 128 / 255))
     assert options.overrides == {"cells": "32"}
+    assert (options.scene_kind, options.skip_missing) == ("auto", False)
+    chosen = Options.from_text({"scene_kind": "forward", "skip_missing": "true"})
+    assert (chosen.scene_kind, chosen.skip_missing) == ("forward", True)
 
 
 def test_options_survive_json() -> None:
-    options = Options.from_text({"preset": "draft", "background": "black"}, ["cells=32"])
+    options = Options.from_text(
+        {"preset": "draft", "background": "black", "scene_kind": "object", "skip_missing": "1"}, ["cells=32"]
+    )
     assert Options.from_json(json.loads(json.dumps(options.as_json()))) == options
 
 
@@ -36,6 +41,8 @@ def test_options_survive_json() -> None:
         {"device": "toaster"},
         {"background": "pink"},
         {"background": "#12345"},
+        {"scene_kind": "indoors"},
+        {"skip_missing": "perhaps"},
     ],
 )
 def test_bad_word_is_refused(words: dict[str, str]) -> None:

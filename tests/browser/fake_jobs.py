@@ -16,6 +16,7 @@ class FakeJobs:
     Attributes:
         jobs: what GET /jobs lists.
         previews: PNGs by job id.
+        captures: PNGs of capture reports by job id.
         events: server-sent progress by job id; ends with `end`.
         refusal: the problem that POST /jobs answers with, when given.
         requests: (method, path) of all requests that change something.
@@ -24,6 +25,7 @@ class FakeJobs:
 
     jobs: list[dict[str, Any]] = field(default_factory=list)
     previews: dict[str, bytes] = field(default_factory=dict)
+    captures: dict[str, bytes] = field(default_factory=dict)
     events: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     refusal: dict[str, Any] | None = None
     requests: list[tuple[str, str]] = field(default_factory=list)
@@ -44,6 +46,8 @@ class FakeJobs:
             return 200, "text/event-stream", self._stream(job_id)
         if rest == "artifacts/preview.png" and job_id in self.previews:
             return 200, "image/png", self.previews[job_id]
+        if rest == "artifacts/capture.png" and job_id in self.captures:
+            return 200, "image/png", self.captures[job_id]
         job = next((job for job in self.jobs if job["id"] == job_id), None)
         if rest == "cancel" and job:
             job["state"] = "cancelled"
@@ -73,6 +77,7 @@ def fake_job(job_id: str, state: str, **changes: Any) -> dict[str, Any]:
         "fraction": 0.0,
         "psnr": None,
         "preview": False,
+        "capture": None,
         "problem": None,
         "artifacts": [],
         **changes,

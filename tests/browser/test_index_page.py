@@ -73,12 +73,17 @@ def test_folder_is_sent_with_paths_relative_to_its_pose_file(
     expect(page.locator("#selection")).to_be_hidden()
 
 
-def test_missing_pose_file_is_pointed_out_before_anything_is_sent(
+def test_photos_without_poses_may_be_sent_and_what_happens_is_said(
     page: Page, site: Site, api: FakeJobs, capture: Path
 ) -> None:
     page.goto(site.url)
-    page.set_input_files("#pick-files", sorted((capture / "train").iterdir()))
-    expect(page.locator("#selection-hint")).to_contain_text("transforms.json")
+    (capture / "train" / "K.txt").write_text("a calibration, but no poses")
+    page.set_input_files("#pick-files", [capture / "train" / name for name in ("r_0.png", "r_1.png", "K.txt")])
+    expect(page.locator("#selection-text")).to_contain_text("2 photos ·")
+    expect(page.locator("#selection-hint")).to_contain_text("at least 3 photos")
+    page.set_input_files("#pick-files", capture / "train" / "r_2.png")
+    expect(page.locator("#selection-hint")).to_contain_text("cameras will be estimated")
+    expect(page.get_by_role("button", name="Make the asset")).to_be_enabled()
     page.set_input_files("#pick-files", capture / "transforms_train.json")
     expect(page.locator("#selection-hint")).to_be_hidden()
     expect(page.locator("#selection-text")).to_contain_text("3 photos, 1 pose file")
@@ -121,6 +126,25 @@ def test_running_job_shows_stage_progress_psnr_and_preview(
     expect(card.locator(".job-stage")).to_have_text("Training shape and appearance · 42 % · 27.18 dB")
     expect(card.locator("progress")).to_have_js_property("value", 0.42)
     expect(card.get_by_role("img", name="Preview of Teapot")).to_be_visible()
+
+
+def test_capture_report_is_shown_while_the_job_runs(page: Page, site: Site, api: FakeJobs, preview: bytes) -> None:
+    api.jobs = [fake_job("a1", "running", name="Castle", stage="mapping", fraction=0.2)]
+    page.goto(site.url)
+    expect(page.locator(".job-stage")).to_contain_text("Finding the cameras")
+    expect(page.locator(".job-report")).to_be_hidden()
+    lines = [
+        {"label": "photos", "text": "11: 9 to train on", "warns": False},
+        {"label": "blur", "text": "1 blurred: <b>2.jpg</b>", "warns": True},
+    ]
+    api.captures["a1"] = preview
+    api.jobs = [fake_job("a1", "running", name="Castle", stage="voxels", fraction=0.3, capture={"lines": lines})]
+    page.evaluate("document.dispatchEvent(new Event('visibilitychange'))")  # looks again without waiting its turn
+    report = page.locator(".job-report")
+    expect(report.locator("summary")).to_have_text("Capture report: 1 remark")
+    expect(report.locator("dt")).to_have_text(["photos", "blur"])
+    expect(report.locator("dd.warns")).to_have_text("1 blurred: <b>2.jpg</b>")
+    expect(report.get_by_role("img", name="Where the photos of Castle were taken from")).to_be_visible()
 
 
 def test_ready_job_links_to_viewer_and_file(page: Page, site: Site, api: FakeJobs) -> None:

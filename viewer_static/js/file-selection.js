@@ -1,7 +1,8 @@
 // The files a person picked or dropped: which of them make up a capture, and under which relative paths.
 
 const PHOTO = /\.(png|jpe?g|webp)$/i;
-const POSES = /\.(json|npy|txt|bin)$/i;
+// Notes and calibrations of other tools are .txt, too; COLMAP's have fixed names.
+const POSES = /\.(json|npy|bin)$|(^|\/)(cameras|images|points3D|frames|rigs)\.txt$/i;
 const ARCHIVE = /\.zip$/i;
 const HIDDEN = /(^|\/)(\.|__MACOSX\/|Thumbs\.db$)/;
 

@@ -1,7 +1,7 @@
 // One job in the list.
 
 import { artifactUrl, viewerUrl } from "./api.js";
-import { formatAgo, formatBytes, formatPsnr } from "./format.js";
+import { formatAgo, formatBytes, formatPsnr, plural } from "./format.js";
 import { nameOfJob } from "./job-name.js";
 import { showProblem } from "./notice.js";
 
@@ -14,6 +14,9 @@ const STATE_NAMES = {
 };
 
 const STAGE_NAMES = {
+  features: "Looking for details in the photos",
+  matching: "Comparing the photos",
+  mapping: "Finding the cameras",
   read: "Reading the photos",
   voxels: "Finding the rough shape",
   field: "Training shape and appearance",
@@ -24,11 +27,13 @@ const STAGE_NAMES = {
 };
 
 const PREVIEW = "preview.png";
+const CAPTURE_PICTURE = "capture.png";
 const CONFIRM_MS = 4000;
 
 export class JobCard {
   #job;
   #shownPreview = "";
+  #shownReport = "";
 
   /** @param {{onCancel: (id: string) => void, onDelete: (id: string) => void}} actions */
   constructor(job, actions) {
@@ -56,6 +61,7 @@ export class JobCard {
     showProblem(this.#find(".job-problem"), job.state === "failed" ? (job.problem ?? {}) : null);
     this.#showProgress();
     this.#showPicture();
+    this.#showReport();
     this.#showActions();
   }
 
@@ -80,6 +86,26 @@ export class JobCard {
     const image = this.#find(".job-picture img");
     image.alt = `Preview of ${nameOfJob(job)}`;
     image.src = url;
+  }
+
+  // The capture report is there before training starts, and stays.
+  #showReport() {
+    const { id, state, capture } = this.#job;
+    const details = this.#find(".job-report");
+    details.hidden = !capture;
+    const lines = capture?.lines ?? [];
+    const text = JSON.stringify(lines);
+    if (text === this.#shownReport) return;
+    const first = this.#shownReport === "";
+    this.#shownReport = text;
+    const warnings = lines.filter(({ warns }) => warns).length;
+    this.#find(".job-report summary").textContent =
+      warnings > 0 ? `Capture report: ${plural(warnings, "remark")}` : "Capture report";
+    this.#find(".job-report dl").replaceChildren(...lines.flatMap(lineNodes));
+    const image = this.#find(".job-report img");
+    image.alt = `Where the photos of ${nameOfJob(this.#job)} were taken from`;
+    image.src = image.parentElement.href = artifactUrl(id, CAPTURE_PICTURE);
+    if (first) details.open = state === "running" || state === "failed";
   }
 
   #showActions() {
@@ -117,6 +143,14 @@ export class JobCard {
   #find(selector) {
     return this.element.querySelector(selector);
   }
+}
+
+function lineNodes({ label, text, warns }) {
+  const [term, description] = [document.createElement("dt"), document.createElement("dd")];
+  term.textContent = label;
+  description.textContent = text;
+  if (warns) term.className = description.className = "warns";
+  return [term, description];
 }
 
 function factsOf(job) {

@@ -66,7 +66,7 @@ export class UploadForm {
     showProblem(byId("upload-problem"), nothing && new Problem({
       code: "no-images",
       detail: "There are no photos among these files.",
-      remedy: "Choose PNG or JPEG photos with their pose file, or one .zip of them.",
+      remedy: "Choose PNG, JPEG or WebP photos, with their pose file if there is one, or one .zip of them.",
     }));
     this.#show();
   }
@@ -88,7 +88,7 @@ export class UploadForm {
     byId("selection").hidden = parts.length === 0;
     byId("selection-text").textContent = `${parts.join(", ")} · ${formatBytes(bytes)}`;
     byId("submit").disabled = parts.length === 0 || this.#sending !== null;
-    const hint = photo > 0 && poses === 0 && archive === 0 ? "The pose file is still missing: add transforms.json." : "";
+    const hint = photo > 0 && poses === 0 && archive === 0 ? hintWithoutPoses(photo) : "";
     byId("selection-hint").textContent = hint;
     byId("selection-hint").hidden = !hint;
     this.#showThumbnails();
@@ -138,4 +138,11 @@ export class UploadForm {
     byId("upload-text").textContent =
       sent >= total ? "Checking the photos…" : `${formatBytes(sent)} of ${formatBytes(total)} sent`;
   }
+}
+
+// As the service: three photos are the least whose cameras can be estimated.
+function hintWithoutPoses(photos) {
+  return photos < 3
+    ? "Without poses, at least 3 photos are needed; 30 to 100 give a good result."
+    : "No poses among the files: the cameras will be estimated from the photos, which takes some minutes.";
 }

@@ -25,7 +25,8 @@ def write_photos(folder: Path, count: int = 8, **changes: float) -> list[Camera]
 def arc(count: int, step_rad: float = 0.12, size_px: tuple[int, int] = SIZE_PX) -> list[Camera]:
     """Cameras on an arc, all looking into the corner."""
     angles = np.pi / 4 + step_rad * (np.arange(count) - (count - 1) / 2)
-    return [_camera(f"{i}", 3.4 * np.array([np.cos(a), np.sin(a), 0.35 + 0.03 * i]), size_px) for i, a in enumerate(angles)]
+    places = [3.4 * np.array([np.cos(a), np.sin(a), 0.35 + 0.03 * i]) for i, a in enumerate(angles)]
+    return [_camera(str(i), place, size_px) for i, place in enumerate(places)]
 
 
 def photo(camera: Camera) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Which photos are compared with which."""
 
+import itertools
+
 import numpy as np
 
 from core.posing.pairs import NEIGHBOURS, PARTNERS, RATIO, likely_pairs, likeness
@@ -47,7 +49,7 @@ def test_each_photo_is_compared_with_its_likest_and_its_neighbours() -> None:
     pairs = likely_pairs(scores)
     assert all(a < b for a, b in pairs)
     by_place = np.argsort(places)
-    for one, other in zip(by_place[:-1], by_place[1:], strict=True):
+    for one, other in itertools.pairwise(by_place):
         assert (min(one, other), max(one, other)) in pairs
     assert all((a, b) in pairs for a in range(count) for b in range(a + 1, min(a + 1 + NEIGHBOURS, count)))
     assert len(pairs) <= count * (PARTNERS + NEIGHBOURS)

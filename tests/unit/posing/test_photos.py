@@ -95,4 +95,17 @@ def test_masks_and_results_are_not_photos(tmp_path: Path) -> None:
         write(tmp_path / "masks" / f"{index}.png")
         write(tmp_path / "depth" / f"{index}.png")
         write(tmp_path / "out" / f"{index}.png")
-    assert find_photo_set(tmp_path, without=tmp_path / "out").names == ("0.png", "1.png", "2.png")
+    photos = find_photo_set(tmp_path, without=tmp_path / "out")
+    assert photos.names == ("0.png", "1.png", "2.png")
+    assert photos.masks == tmp_path / "masks"
+
+
+def test_masks_beside_the_photos_are_linked_for_the_reader(tmp_path: Path) -> None:
+    for index in range(3):
+        write(tmp_path / "capture" / "images" / f"{index}.png")
+        write(tmp_path / "capture" / "masks" / f"{index}.png.png")
+    photos = find_photo_set(tmp_path)
+    workspace = Workspace(tmp_path / "work")
+    workspace.claim(identity_of(photos))
+    workspace.link_photos(photos, read_headers(photos))
+    assert (workspace.folder / "masks" / "2.png.png").is_file()

@@ -10,7 +10,7 @@ from core.presets import settings_for
 from core.training import field_stage
 
 HASTY = settings_for(
-    "draft", cells=12, patch=3, nodes=20, voxel_steps=30, field_steps=15, texel_steps=15,
+    "draft", cells=16, patch=3, nodes=20, voxel_steps=30, field_steps=15, texel_steps=15,
     voxel_batch=512, field_batch=512, texel_batch=256,
 )  # fmt: skip
 

@@ -18,10 +18,10 @@ import numpy as np
 from benchmarks.ablations import ABLATIONS, FULL, Ablation
 from benchmarks.child_process import in_child, peak_memory_bytes
 from benchmarks.hardware import hardware
+from benchmarks.photo_options import add_photo_options, photo_options_of, read_photos
 from benchmarks.tables import figure, markdown, merged
 from core.baked import BakedScene
 from core.capture import View
-from core.datasets import read_capture
 from core.device import resolve_device
 from core.errors import PolyfieldError
 from core.evaluation import evaluate
@@ -31,7 +31,6 @@ from core.reconstruct import reconstruct
 from core.render.composite import over, quantised
 from core.render.raster import Rasteriser
 from exporters.gltf import read_glb, write_glb
-from service.capture_source import opened_capture
 from service.conversion import SCENE
 
 RESULTS = Path(__file__).parent / "results"
@@ -64,26 +63,28 @@ class AblationRow:
 def train_row(name: str, path: Path, photos: dict[str, Any], base: Settings, device: str, seed: int) -> AblationRow:
     """Trains one row of the table."""
     ablation = next(one for one in ABLATIONS if one.name == name)
-    with opened_capture(path) as source:
-        capture = read_capture(source, **photos)
+    capture = read_photos(path, photos)
     settings = replace(base, **ablation.settings(base))
     with ablation.within():
         trained = reconstruct(capture, settings, device=device, seed=seed)
     peak = peak_memory_bytes()
     glb = write_glb(trained.scene)[SCENE]
     scene = read_glb(glb)
-    quality = forward_psnr(scene, capture.test, device) if ablation.forward else evaluate(scene, capture.test).psnr
+    quality = (
+        forward_psnr(scene, capture.test, device)
+        if ablation.forward
+        else evaluate(scene, capture.test, device=device).psnr
+    )
     words = f"{path.resolve().stem}, {base_words(base)}, {hardware(device)}"
     return AblationRow(name, words, quality or 0.0, sum(trained.seconds.values()), len(glb), scene.quad_count, peak)
 
 
 def forward_psnr(scene: BakedScene, views: tuple[View, ...], device: str) -> float:
     """Mean PSNR (dB) of views drawn with one sample a pixel."""
-    rasteriser = Rasteriser(scene, device)
-    scores = [
-        psnr(view.over(scene.background), quantised(over(rasteriser.forward(view.camera), scene.background)) / 255.0)
-        for view in views
-    ]
+    rasteriser, scores = Rasteriser(scene, device), []
+    for view in views:
+        drawn = quantised(over(rasteriser.forward(view.camera), scene.background)) / 255.0
+        scores.append(psnr(view.over(scene.background), drawn, view.ignored))
     return float(np.mean(scores))
 
 
@@ -126,7 +127,7 @@ def sign(delta: float | None, paper_delta: float | None) -> str:
 def main() -> int:
     arguments = _arguments()
     names = [one.name for one in ABLATIONS if not arguments.rows or any(word in one.name for word in arguments.rows)]
-    photos = {"max_size_px": arguments.max_size_px}
+    photos = photo_options_of(arguments)
     overrides = SMALL | dict(text.split("=", 1) for text in arguments.set)
     rows = []
     try:
@@ -156,7 +157,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--rows", nargs="+", default=[], help=f"words; e.g. {FULL!r}, 'K ='")
     parser.add_argument("--device", default="auto")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--max-size-px", type=int, default=None)
+    add_photo_options(parser)
     parser.add_argument("--results", type=Path, default=RESULTS)
     return parser.parse_args()
 

@@ -15,12 +15,11 @@ from pathlib import Path
 from PIL import Image
 
 from benchmarks.hardware import hardware
+from benchmarks.photo_options import photo_options_in, read_photos
 from benchmarks.results import ConvertRow, add_row
-from core.datasets import read_capture
 from core.errors import PolyfieldError
 from core.evaluation import comparison_picture
 from exporters.gltf import read_glb
-from service.capture_source import opened_capture
 from service.commands.common import add_options, options_of
 from service.commands.progress_bar import ProgressBar
 from service.conversion import SCENE, convert
@@ -85,10 +84,7 @@ def _row(
 
 
 def _comparison(arguments: argparse.Namespace, options: Options, out: Path, device: str) -> Image.Image:
-    with opened_capture(arguments.capture) as source:
-        capture = read_capture(
-            source, max_size_px=options.max_size_px, downscale=options.downscale, background=options.background
-        )
+    capture = read_photos(arguments.capture, photo_options_in(options))
     views = capture.test or capture.train
     view = views[arguments.view % len(views)]
     picture = comparison_picture(read_glb((out / SCENE).read_bytes()), view, device=device)

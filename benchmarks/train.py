@@ -21,6 +21,7 @@ import numpy as np
 from benchmarks.chart import Curve, draw_chart
 from benchmarks.child_process import gpu_memory_bytes, in_child, peak_memory_bytes
 from benchmarks.hardware import hardware
+from benchmarks.photo_options import add_photo_options, photo_options_of, read_photos
 from benchmarks.reference_setting import PaperRun, PaperSetting, bake_paper
 from benchmarks.reference_setting.setting import ON_A_CPU
 from benchmarks.reference_setting.training import Moment
@@ -28,7 +29,6 @@ from benchmarks.tables import figure, markdown, merged
 from benchmarks.watching import CurvePoint, Watch
 from core.baked import BakedScene
 from core.capture import Capture
-from core.datasets import read_capture
 from core.device import resolve_device
 from core.errors import PolyfieldError, TrainingFailed
 from core.evaluation import evaluate
@@ -36,7 +36,6 @@ from core.metrics import psnr
 from core.presets import PRESETS, Settings, settings_for
 from core.reconstruct import reconstruct
 from exporters.gltf import read_glb, write_glb
-from service.capture_source import opened_capture
 from service.conversion import SCENE
 
 RESULTS = Path(__file__).parent / "results"
@@ -83,7 +82,7 @@ class TrainRow:
 
 def train_ours(path: Path, photos: dict[str, Any], settings: Settings, device: str, seed: int) -> TrainRow:
     """One of our settings."""
-    capture = _read(path, photos)
+    capture = read_photos(path, photos)
     _compile_kernels(capture, settings, device)
     with Watch(_spread(capture, CURVE_VIEWS), device).attached() as watch:
         trained = reconstruct(capture, settings, device=device, seed=seed)
@@ -95,7 +94,7 @@ def train_paper(
     path: Path, photos: dict[str, Any], setting: PaperSetting, budget_s: float, device: str, seed: int
 ) -> TrainRow:
     """The paper's setting, for a given time."""
-    capture = _read(path, photos)
+    capture = read_photos(path, photos)
     run, points = PaperRun(capture, setting, device=device, seed=seed), []
     pixels, gpu_bytes = PAPER_PIXELS[device.partition(":")[0]], 0
 
@@ -138,13 +137,8 @@ def _row(
 
 def _empty_psnr(capture: Capture) -> float:
     background = np.asarray(capture.background, np.float32)
-    photos = [view.over(capture.background) for view in capture.test]
-    return float(np.mean([psnr(photo, np.broadcast_to(background, photo.shape)) for photo in photos]))
-
-
-def _read(path: Path, photos: dict[str, Any]) -> Capture:
-    with opened_capture(path) as source:
-        return read_capture(source, **photos)
+    photos = [(view.over(capture.background), view.ignored) for view in capture.test]
+    return float(np.mean([psnr(photo, np.broadcast_to(background, photo.shape), mask) for photo, mask in photos]))
 
 
 def _spread(capture: Capture, count: int) -> list[Any]:
@@ -194,7 +188,7 @@ def main() -> int:
 
 
 def _measured(arguments: argparse.Namespace, device: str) -> list[TrainRow]:
-    photos = {"max_size_px": arguments.max_size_px, "downscale": arguments.downscale}
+    photos = photo_options_of(arguments)
     overrides = dict(text.split("=", 1) for text in arguments.set)
     rows = []
     for preset in arguments.presets:
@@ -235,8 +229,7 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("--device", default="auto")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--max-size-px", type=int, default=None)
-    parser.add_argument("--downscale", type=int, default=1)
+    add_photo_options(parser)
     parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the table and the charts")
     return parser.parse_args()
 

@@ -74,7 +74,7 @@ class Watch:
             for view in self.views:
                 run.capture = replace(capture, test=(view,))
                 if (picture := show()) is not None:
-                    scores.append(psnr(view.over(capture.background), picture / 255.0))
+                    scores.append(psnr(view.over(capture.background), picture / 255.0, view.ignored))
         finally:
             run.capture = capture
         if scores:

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.capture import Capture
+from core.errors import OptionInvalid
 from core.field.region import find_region
+from core.scene_kind import OBJECT
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,9 @@ def cube_around(capture: Capture) -> Cube:
 
     Raises:
         CaptureEmpty
+        OptionInvalid: the capture is no object; the paper's other two meshes are not written here.
     """
+    if capture.kind.name != OBJECT:
+        raise OptionInvalid("the paper's setting", "needs a capture of an object", f"one that is {capture.kind.name}")
     frame = find_region(capture).frame
     return Cube(frame.centre, frame.half)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from core.posing.posing import NO_DETAIL
 from core.scene_kind import FORWARD, UNBOUNDED
 
 if TYPE_CHECKING:
@@ -111,11 +112,16 @@ def _coverage(report: CaptureReport) -> Line:
 
 
 def _blur(report: CaptureReport) -> Line:
-    blurred = [photo for photo in report.photos if photo.blurred]
+    # What has no detail at all was said to be left out already.
+    blurred = [photo for photo in report.photos if photo.blurred and photo.name not in _without_detail(report)]
     if not blurred:
         return Line("blur", "no photo is much less sharp than the others")
     names = [f"{photo.name} ({photo.sharpness:.0%} of the usual sharpness)" for photo in blurred]
     return Line("blur", f"{len(blurred)} blurred: {named(names)}", warns=True)
+
+
+def _without_detail(report: CaptureReport) -> set[str]:
+    return {photo.name for photo in report.left_out if photo.reason == NO_DETAIL}
 
 
 def _exposure(report: CaptureReport) -> Line:

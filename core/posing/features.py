@@ -13,6 +13,7 @@ import pycolmap
 from core.errors import InputError
 from core.images import read_reduced, read_size
 from core.posing.lenses import SharedLens
+from core.posing.posing import NO_DETAIL
 
 # Photos are reduced to this longest side. Poses get no better from more (their error is about half a pixel of these),
 # and a photo takes 1.2 s and 150 MB a thread, whatever it had.
@@ -22,7 +23,6 @@ DOUBLED_UP_TO_PX = 1200
 MAX_FEATURES = 6000
 MIN_FEATURES = 50  # fewer match by chance only
 UNDECODABLE = "cannot be decoded"
-NO_DETAIL = "with hardly any detail, blank or far out of focus"
 LUMA = (0.299, 0.587, 0.114)
 THREADS = 2  # each holds a photo
 

@@ -12,6 +12,7 @@ from core.errors import PosesNotFound
 from core.posing.photo_set import MIN_PHOTOS
 
 MAX_NAMED = 4
+NO_DETAIL = "with hardly any detail, blank or far out of focus"
 REMEDY = (
     "Photograph something with detail that stands still, each photo overlapping its neighbours by two thirds, and from "
     "another place; or add a pose file."
@@ -73,7 +74,8 @@ class Posing:
         """In one line: how many were posed, and why others were not."""
         total = len(self.registered) + len(self.left_out)
         left = [f"{len(names)} {reason} ({named(names)})" for reason, names in self.reasons.items()]
-        return "; ".join([f"{len(self.registered)} of {total} photos could be posed", *left])
+        posed = f"{len(self.registered)} of {total} photos posed"
+        return f"{posed}: {'; '.join(left)}" if left else posed
 
     def require_usable(self) -> None:
         """Raises PosesNotFound unless at least `MIN_PHOTOS` photos are posed."""

@@ -63,7 +63,7 @@ def test_photos_that_are_left_out_have_reasons(posing: Posing) -> None:
     assert "hardly any detail" in reasons[BLANK]
     assert "match" in reasons[NOISE]
     assert "cannot be read" in reasons[TEXT]
-    assert posing.summary.startswith("8 of 11 photos could be posed; ")
+    assert posing.summary.startswith("8 of 11 photos posed: ")
 
 
 def test_cameras_agree_with_the_true_ones_up_to_a_similarity(posing: Posing, cameras: list[Camera]) -> None:

@@ -13,7 +13,7 @@ from core.camera import Camera
 from core.capture import View
 from core.conventions import SUBPIXEL_OFFSETS_PX
 from core.field.frame import Frame, as_vec3, empty
-from core.images import downscaled
+from core.images import downscaled, downscaled_size
 from core.kernels.camera_rays import camera_rays
 from core.kernels.launch import launch
 
@@ -31,6 +31,7 @@ class Batch:
         origins, directions: [n * subrays, 3] in the scene's frame, a pixel's sub-rays together.
         centre_directions: [n, 3], through the pixels' centres, in the object frame: the network's.
         color: [n, 3], true colour times alpha. alpha: [n].
+        image: [n] int64, the training photo that each pixel is of.
     """
 
     origins: Tensor
@@ -38,25 +39,33 @@ class Batch:
     centre_directions: Tensor
     color: Tensor
     alpha: Tensor
+    image: Tensor
 
 
 class PixelPool:
-    """All training pixels at one resolution."""
+    """All training pixels at one resolution.
+
+    A pixel takes 3 bytes, or 4 where photos have an alpha channel, and 4 more where not every pixel may be drawn.
+    Photos are gone through one by one, so that little is needed besides.
+    """
 
     def __init__(self, views: Sequence[View], frame: Frame, device: str, factor: int = 1, seed: int = 0) -> None:
         """Args: factor: the photos are area-averaged by it first."""
-        images = [_rgba(downscaled(view.image_u8, factor)) for view in views]
-        cameras = [v.camera.resized((im.shape[1], im.shape[0])) for v, im in zip(views, images, strict=True)]
-        sizes = [image.shape[0] * image.shape[1] for image in images]
+        cameras = [view.camera.resized(downscaled_size(view.camera.size_px, factor)) for view in views]
         self.device, self._frame = device, frame
         self._cameras = frame.camera_array(cameras, device)
-        self._pixels = torch.from_numpy(np.concatenate([image.reshape(-1, 4) for image in images])).to(device)
-        self._starts = np.concatenate([[0], np.cumsum(sizes)])
+        self._starts = np.concatenate([[0], np.cumsum([camera.size_px[0] * camera.size_px[1] for camera in cameras])])
         self._widths = np.array([camera.size_px[0] for camera in cameras])
-        kept = [_kept(view.ignored, factor, image.shape[:2]) for view, image in zip(views, images, strict=True)]
-        self._pool = _worth_drawing(images, kept, np.random.default_rng([seed, 1]))
+        pixels = _side_by_side(views, factor, self._starts)
+        self._pool = _worth_drawing(pixels, views, factor, self._starts, np.random.default_rng([seed, 1]))
+        self._pixels = torch.from_numpy(pixels).to(device)
         self._sub_offsets: Any = wp.array(SUBPIXEL_OFFSETS_PX.astype(np.float32), dtype=wp.vec2, device=device)
         self._no_offset: Any = wp.zeros(1, dtype=wp.vec2, device=device)
+
+    @property
+    def size(self) -> int:
+        """Number of pixels that may be drawn."""
+        return int(self._starts[-1]) if self._pool is None else len(self._pool)
 
     def draw(self, rng: np.random.Generator, count: int, *, supersampled: bool) -> Batch:
         """`count` pixels: with four sub-rays each, or with one ray through each pixel's centre.
@@ -64,7 +73,9 @@ class PixelPool:
         (A ray somewhere within the pixel would learn the mean over the pixel at every place of it: blurred twice. On
         lego_400 that cost the voxel field 1.25 dB.)
         """
-        index = self._pool[rng.integers(0, len(self._pool), count)]
+        index = rng.integers(0, self.size, count)
+        if self._pool is not None:
+            index = self._pool[index].astype(np.int64)
         image = np.searchsorted(self._starts, index, side="right") - 1
         local = index - self._starts[image]
         point = np.stack([local % self._widths[image], local // self._widths[image]], -1) + 0.5
@@ -73,9 +84,10 @@ class PixelPool:
         origins, directions = self._rays(images, points, self._sub_offsets if supersampled else self._no_offset)
         centres = self._rays(images, points, self._no_offset)[1] if supersampled else directions
         centres = self._frame.directions_to_object(centres)
-        rgba = self._pixels[torch.from_numpy(index).to(self.device)].float() / 255.0
-        alpha = rgba[:, 3]
-        return Batch(origins, directions, centres, rgba[:, :3] * alpha[:, None], alpha)
+        values = self._pixels[torch.from_numpy(index).to(self.device)].float() / 255.0
+        alpha = values[:, 3] if values.shape[1] == 4 else torch.ones_like(values[:, 0])
+        photo = torch.from_numpy(image).to(self.device)
+        return Batch(origins, directions, centres, values[:, :3] * alpha[:, None], alpha, photo)
 
     def _rays(self, images: Any, points: Any, offsets: Any) -> tuple[Tensor, Tensor]:
         n = len(images) * len(offsets)
@@ -85,10 +97,47 @@ class PixelPool:
         return origins, directions
 
 
-def _rgba(image_u8: np.ndarray) -> np.ndarray:
-    if image_u8.shape[2] == 4:
-        return image_u8
-    return np.concatenate([image_u8, np.full_like(image_u8[..., :1], 255)], -1)
+def _side_by_side(views: Sequence[View], factor: int, starts: np.ndarray) -> np.ndarray:
+    """[n, 3] uint8, or [n, 4] where any photo has an alpha channel: all photos' pixels; photo i begins at starts[i]."""
+    pixels = np.empty((starts[-1], 4 if any(view.has_alpha for view in views) else 3), np.uint8)
+    for view, first, last in zip(views, starts[:-1], starts[1:], strict=True):
+        image = downscaled(view.image_u8, factor)
+        channels = image.shape[2]
+        pixels[first:last, :channels] = image.reshape(-1, channels)
+        pixels[first:last, channels:] = 255
+    return pixels
+
+
+def _worth_drawing(
+    pixels: np.ndarray, views: Sequence[View], factor: int, starts: np.ndarray, rng: np.random.Generator
+) -> np.ndarray | None:
+    """Indices of the pixels that no mask takes out, on or near the object, and of a share of the others.
+
+    None where those are all.
+    """
+    if not any(view.has_alpha or view.ignored is not None for view in views):
+        return None
+    # As long as all pixels together; what is never written takes no memory.
+    pool = np.empty(len(pixels), np.uint32 if len(pixels) <= 1 << 32 else np.int64)
+    count = 0
+    for view, first, last in zip(views, starts[:-1], starts[1:], strict=True):
+        width, height = downscaled_size(view.camera.size_px, factor)
+        shape = height, width
+        near = _near_object(pixels[first:last, 3].reshape(shape)) if view.has_alpha else np.ones(shape, bool)
+        drawn = _kept(view.ignored, factor, shape) & (near | (rng.random(shape) < BACKGROUND_SHARE))
+        found = np.flatnonzero(drawn)
+        pool[count : count + len(found)] = found + first
+        count += len(found)
+    return pool[:count]
+
+
+def _near_object(alpha_u8: np.ndarray) -> np.ndarray:
+    """[h, w] bool: pixels on or near the object."""
+    near = alpha_u8 > 0
+    reach = max(1, round(NEAR_OBJECT * alpha_u8.shape[1]))
+    for axis in (0, 1):
+        near = _dilated(near, reach, axis)
+    return near
 
 
 def _kept(ignored: np.ndarray | None, factor: int, shape: tuple[int, int]) -> np.ndarray:
@@ -97,18 +146,6 @@ def _kept(ignored: np.ndarray | None, factor: int, shape: tuple[int, int]) -> np
         return np.ones(shape, bool)
     mask = np.repeat(ignored[..., None].astype(np.uint8) * np.uint8(255), 3, 2)
     return downscaled(mask, factor)[..., 0] == 0
-
-
-def _worth_drawing(images: Sequence[np.ndarray], kept: Sequence[np.ndarray], rng: np.random.Generator) -> np.ndarray:
-    """Indices of the kept pixels on or near the object, and of a share of the others."""
-    drawn = []
-    for image, keep in zip(images, kept, strict=True):
-        near = image[..., 3] > 0
-        reach = max(1, round(NEAR_OBJECT * image.shape[1]))
-        for axis in (0, 1):
-            near = _dilated(near, reach, axis)
-        drawn.append((keep & (near | (rng.random(near.shape) < BACKGROUND_SHARE))).ravel())
-    return np.flatnonzero(np.concatenate(drawn))
 
 
 def _dilated(mask: np.ndarray, reach: int, axis: int) -> np.ndarray:

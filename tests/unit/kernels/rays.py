@@ -52,4 +52,4 @@ def batch_of(origins: Sequence, directions: Sequence, device: str = "cpu") -> Ba
     """The rays as a training batch; its colours are not for use."""
     o, d = (torch.from_numpy(np.ascontiguousarray(a, np.float32)).to(device) for a in (origins, directions))
     nothing = torch.empty(0, device=device)
-    return Batch(o, d, d, nothing, nothing)
+    return Batch(o, d, d, nothing, nothing, nothing)

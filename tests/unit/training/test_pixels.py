@@ -1,5 +1,7 @@
 """Training pixels: their rays and their colours."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -8,7 +10,7 @@ from core.camera import Camera
 from core.capture import View
 from core.conventions import SUBPIXEL_OFFSETS_PX
 from core.field.frame import Frame
-from core.training.pixels import BACKGROUND_SHARE, PixelPool, camera_rays_of
+from core.training.pixels import BACKGROUND_SHARE, NEAR_OBJECT, PixelPool, camera_rays_of
 from tests.scenes import look_at_camera
 from tests.unit.training.captures import ball, capture_of
 
@@ -94,6 +96,57 @@ def test_far_from_the_object_a_share_of_the_pixels_is_drawn(rng):
     assert np.isin(np.flatnonzero(near), pool).all()
     share = (len(pool) - near.sum()) / (~near).sum()
     assert share == pytest.approx(BACKGROUND_SHARE, abs=0.02)
+
+
+def chosen_slowly(views: list[View], seed: int) -> np.ndarray:
+    """The oracle: all photos at once, in RGBA, with every pixel's number in 64 bits."""
+    rng, drawn = np.random.default_rng([seed, 1]), []
+    for view in views:
+        alpha = view.premultiplied()[1]
+        reach, near = max(1, round(NEAR_OBJECT * alpha.shape[1])), np.zeros(alpha.shape, bool)
+        for y, x in np.argwhere(alpha > 0):
+            near[max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1] = True
+        lucky = rng.random(alpha.shape) < BACKGROUND_SHARE
+        drawn.append(((near | lucky) & (True if view.ignored is None else ~view.ignored)).ravel())
+    return np.flatnonzero(np.concatenate(drawn))
+
+
+def without_alpha(view: View) -> View:
+    return replace(view, image_u8=np.ascontiguousarray(view.image_u8[..., :3]))
+
+
+def half_masked(view: View) -> View:
+    return replace(view, ignored=view.camera.pixel_centres()[..., 1] > view.camera.size_px[1] / 2)
+
+
+def half_empty(view: View) -> View:
+    left = view.camera.pixel_centres()[..., :1] < view.camera.size_px[0] / 2
+    return replace(view, image_u8=np.where(left, np.uint8(0), view.image_u8))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [(half_empty, half_empty), (without_alpha, without_alpha), (half_empty, without_alpha), (half_masked, half_empty),
+     (lambda view: half_masked(without_alpha(view)), without_alpha)],
+)  # fmt: skip
+def test_what_may_be_drawn_is_what_the_oracle_says(rng, changes):
+    views = [change(view) for change, view in zip(changes, marked_views(rng, sizes=((60, 40), (37, 53))), strict=True)]
+    pool, expected = PixelPool(views, FRAME, "cpu", seed=3), chosen_slowly(views, seed=3)
+    np.testing.assert_array_equal(np.arange(pool.size) if pool._pool is None else pool._pool, expected)
+
+
+def test_a_pixel_takes_no_more_bytes_than_it_must(rng):
+    """What core/datasets/budget.py counts on."""
+    opaque = [without_alpha(view) for view in marked_views(rng)]
+    pool = PixelPool(opaque, FRAME, "cpu")
+    assert (pool._pixels.shape[1], pool._pool) == (3, None)
+    assert PixelPool([half_masked(view) for view in opaque], FRAME, "cpu")._pool.dtype == np.uint32
+
+
+def test_a_batch_says_which_photo_each_pixel_is_of(rng):
+    views = marked_views(rng)
+    batch = PixelPool(views, FRAME, "cpu").draw(rng, 200, supersampled=False)
+    np.testing.assert_array_equal(batch.image, marks(batch)[0])
 
 
 def test_the_same_generator_draws_the_same_pixels():

@@ -91,12 +91,11 @@ def along_the_axes(source: Path, target: Path) -> Path:
 def many_large_photos(source: Path, target: Path, *, count: int, size_px: int) -> Path:
     """`count` training photos of `size_px`: a few of the capture's, enlarged, again and again (linked)."""
     copied(source, target)
-    content = poses_of(target, "train")
-    originals = content["frames"][:COPIES_MADE_OF]
-    for frame in originals:
+    content = {split: poses_of(target, split) for split in SPLITS}
+    originals, held_out = content["train"]["frames"][:COPIES_MADE_OF], content["test"]["frames"][:1]
+    for frame in (*originals, *held_out):
         path = target / f"{frame['file_path']}.png"
         large = Image.open(path).resize((size_px, size_px), Image.Resampling.NEAREST)
-        path.unlink()  # a copy of its own, whatever it is linked to
         large.save(path, compress_level=1)
     frames = []
     for index in range(count):
@@ -104,7 +103,8 @@ def many_large_photos(source: Path, target: Path, *, count: int, size_px: int) -
         name = f"./train/copy_{index}"
         (target / f"{name}.png").hardlink_to(target / f"{original['file_path']}.png")
         frames.append({**original, "file_path": name})
-    write_poses(target, "train", {**content, "frames": frames})
+    write_poses(target, "train", {**content["train"], "frames": frames})
+    write_poses(target, "test", {**content["test"], "frames": held_out})
     return target
 
 

@@ -123,7 +123,7 @@ def _unbounded_region(capture: Capture) -> Region:
 
 
 def _commonly_seen(views: Sequence[View], frame: Frame, space: Space) -> np.ndarray:
-    """[64]^3 bool: cells of the grid within at least two photos, not right before a lens."""
+    """[64]^3 bool: cells of the grid within at least two photos, not right before a lens; of the backdrop, all."""
     ticks = (np.arange(HULL_CELLS) + 0.5) * (2.0 / HULL_CELLS) - 1.0
     grid = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), -1).reshape(-1, 3)
     points = frame.to_object(space.to_scene(grid))
@@ -138,7 +138,7 @@ def _commonly_seen(views: Sequence[View], frame: Frame, space: Space) -> np.ndar
         width, height = camera.size_px
         seen += (local[:, 2] < 0) & (x >= 0) & (y >= 0) & (x < width) & (y < height)
         blocked |= (local**2).sum(-1) < radius**2
-    return ((seen >= 2) & ~blocked).reshape((HULL_CELLS,) * 3)
+    return ((seen >= 2) & ~blocked).reshape((HULL_CELLS,) * 3) | space.backdrop(HULL_CELLS)
 
 
 def _object_region(capture: Capture) -> Region:

@@ -65,11 +65,6 @@ class Space:
         """Half the edge, in the grid, of the cube that the scene's cube [-1, 1]^3 becomes."""
         return INNER if self.kind == SHELLS else 1.0
 
-    @property
-    def mesh_scale(self) -> float:
-        """The size in the grid of what measures 1 in the mesh's cells' own cube (see `to_mesh`)."""
-        return self.inner
-
     def to_grid(self, points: np.ndarray) -> np.ndarray:
         """Grid points of scene points [..., 3], float64."""
         p = np.asarray(points, np.float64)
@@ -97,8 +92,19 @@ class Space:
         return g
 
     def cells_to_scene(self, points: np.ndarray) -> np.ndarray:
-        """Scene points of points of the mesh's cells' cube [-1, 1]^3: the grid, but for SHELLS the cube in its middle."""
+        """Scene points of points of the mesh's cells' cube [-1, 1]^3: the grid; for SHELLS the cube in its middle."""
         return self.to_scene(points) if self.kind == TAPER else np.asarray(points, np.float64)
+
+    def backdrop(self, cells: int) -> np.ndarray:
+        """[cells]^3 bool: the grid's cells at the far end, where every ray ends that meets nothing before; none in a
+        CUBE, whose surroundings are empty."""
+        far = np.zeros((cells,) * 3, bool)
+        if self.kind == TAPER:
+            far[:, :, -1] = True
+        elif self.kind == SHELLS:
+            far[:] = True
+            far[1:-1, 1:-1, 1:-1] = False
+        return far
 
     def shell_halves(self, count: int) -> np.ndarray:
         """[count + 1] float64: half the edges of the shells, from 1 to reach (eq. 24); none unless SHELLS."""

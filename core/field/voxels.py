@@ -17,6 +17,8 @@ from core.kernels.march import VoxelGrid
 # Raw density scales with the cube, so that a grid of any resolution starts equally thin.
 DENSITY_SCALE = 64.0
 INITIAL_DENSITY = 0.004
+# Light that passes everything ends here, from the start: over a hole, photos would fit any colour.
+BACKDROP_DENSITY = 1.0
 EMPTY_DENSITY = -0.25  # also the lowest value: further down no gradient would bring it back
 HIGHEST_DENSITY = 30.0
 # A cell stays if its mean density over 3^3 nodes is above this: single nodes are noise (Adam moves them a full step).
@@ -48,6 +50,7 @@ class VoxelField:
         n = nodes**3
         noise = torch.randn(n, FEATURE_CHANNELS, generator=generator)
         density = torch.full((n,), INITIAL_DENSITY)
+        density[torch.from_numpy(space.backdrop(nodes)).reshape(-1)] = BACKDROP_DENSITY
         parameters = Parameters.starting_from(density.to(device), (0.5 + 0.02 * noise).to(device))
         occupied = torch.from_numpy(hull.copy()).to(device)
         return cls(space, nodes, parameters, occupied, _active_nodes(occupied, nodes))
@@ -80,6 +83,7 @@ class VoxelField:
         self.parameters.scalar[~near.reshape(-1)] = EMPTY_DENSITY
         found = functional.adaptive_max_pool3d(kept.float()[None, None], cells)[0, 0] > 0
         occupied = _over_neighbours(found, torch.logical_or, False)
+        occupied |= torch.from_numpy(self.space.backdrop(cells)).to(occupied.device)
         self.occupied = occupied & _on_grid(torch.from_numpy(hull).to(occupied.device), cells)
         self.active = _active_nodes(self.occupied, n)
 

@@ -219,8 +219,10 @@ def survey(
 ):
     """What the rays saw in each cell of the mesh, and of the shells around it."""
     r = first + wp.tid()
+    left = float(1.0)
     for n in range(wp.min(samples.count[r], samples.t.shape[1])):
         w = samples.transmittance[r, n] * samples.alpha[r, n]
+        left -= w
         if w > 1.0e-3:
             p = origins[r] + samples.t[r, n] * directions[r]
             if space.kind == SHELLS and wp.abs(p[largest_axis(p)]) > 1.0:
@@ -231,3 +233,7 @@ def survey(
                 wp.atomic_max(peak, part, cell, w)
                 wp.atomic_add(mass, part, cell, w)
                 wp.atomic_add(moment, part, cell, w * g)
+    if space.kind == SHELLS and left > 1.0e-3:
+        near, far = grid_span(space, origins[r], directions[r], 1.0)
+        p = origins[r] + far * directions[r]
+        wp.atomic_max(shell_peak, part, nearest_shell_cell(space, p, shells, cells), left)

@@ -74,7 +74,7 @@ def grid_velocity(space: Space, p: wp.vec3, d: wp.vec3):
 
 @wp.func
 def to_cells(space: Space, p: wp.vec3):
-    """The point of the mesh's cells' cube [-1, 1]^3 of a scene point: the grid, but for SHELLS the cube in its middle."""
+    """The point of the mesh's cells' cube [-1, 1]^3 of a scene point: the grid; for SHELLS the cube in its middle."""
     if space.kind == TAPER:
         return to_grid(space, p)
     return p

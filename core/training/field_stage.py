@@ -81,6 +81,8 @@ class FieldStage(Stage):
         density = voxels.field.parameters.scalar.clamp_min(0.0)
         # A quad stands for the matter within about a cell of it.
         alpha = 1.0 - torch.exp(-density * (DENSITY_SCALE * mesh.cell_size * mesh.space.inner))
+        backdrop = torch.from_numpy(mesh.space.backdrop(voxels.field.nodes)).reshape(-1)
+        alpha[backdrop.to(device)] = 1.0
         parameters = Parameters.starting_from(alpha, voxels.field.parameters.features)
         nodes, active = voxels.field.nodes, voxels.field.active
         return cls(pool, mesh, nodes, active, parameters, voxels.network, settings, voxels.seed, device)

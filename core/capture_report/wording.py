@@ -51,10 +51,11 @@ def _photos(report: CaptureReport) -> Line:
     count = len(report.photos)
     if not report.is_usable:
         return Line("photos", f"{count}, none of them used", warns=True)
+    few = "; 30 to 100 give a good result" if count < FEW_PHOTOS else ""
     held = [photo.name for photo in report.photos if photo.held_out]
     if not held:
-        return Line("photos", f"{count}, all to train on; none is held out, so quality cannot be measured")
-    few = "; 30 to 100 give a good result" if count < FEW_PHOTOS else ""
+        text = f"{count}, all to train on; none is held out, so quality cannot be measured{few}"
+        return Line("photos", text, warns=bool(few))
     train = f"{count - len(held)} to train on, {len(held)} held out to measure ({named(held)})"
     return Line("photos", f"{count}: {train}{few}", warns=bool(few))
 
@@ -136,12 +137,16 @@ def _expected(report: CaptureReport) -> Iterator[Line]:
     if report.expected is None:
         return
     low, high = report.expected.glb_bytes / report.expected.factor, report.expected.glb_bytes * report.expected.factor
-    size = f"{low / 1e6:.0f} to {high / 1e6:.0f} MB"
+    size = f"{megabytes(low)} to {megabytes(high)} MB"
     if report.expected.seconds is None:
         yield Line("expected", f"a scene.glb of {size}; how long it takes was never measured on this device")
         return
     least, most = (report.expected.seconds * share for share in (1 / report.expected.factor, report.expected.factor))
     yield Line("expected", f"{duration(least)} to {duration(most)} of training, a scene.glb of {size}")
+
+
+def megabytes(count: float) -> str:
+    return f"{count / 1e6:.1f}" if count < 10e6 else f"{count / 1e6:.0f}"
 
 
 def duration(seconds: float) -> str:

@@ -22,6 +22,7 @@ from core.progress import Progress, ProgressCallback, ignore_progress
 
 # The stages' shares of the time, for the progress bar: 50 photos, two cores.
 STAGES = {"features": (0.0, 0.25), "matching": (0.25, 0.7), "mapping": (0.7, 1.0)}
+GLANCE_SHARE = 0.1  # of matching, for choosing the pairs
 UNMATCHED = "without matches with other photos"
 UNPOSED = "whose matches fit no pose among the others"
 APART = "that could only be posed apart from the others"
@@ -62,7 +63,8 @@ class _Run:
         with self._stage("features") as done:
             faults = write_features(database, self.workspace.images, self.numbers, done)
         with self._stage("matching") as done:
-            write_matches(database, pairs_to_match(database), self.seed, done)
+            pairs = pairs_to_match(database, lambda share: done(GLANCE_SHARE * share))
+            write_matches(database, pairs, self.seed, lambda share: done(GLANCE_SHARE + (1 - GLANCE_SHARE) * share))
         with self._stage("mapping") as done:
             models = mapped(database, len(self.numbers), self.seed, done)
         return self._outcome(models, faults)

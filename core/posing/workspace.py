@@ -3,6 +3,7 @@
 masks            a link to the photos' masks, if there are any
 images/          links to the photos; upright copies of those that are stored lying on a side
 database.db      COLMAP's: features and matches, each written when it is found; gone when posing is done
+pairs.txt        the pairs that it is matching; gone, too
 sparse/0/        the model
 identity.json    what the folder was made from; work for other photos or settings is thrown away
 posing.json      the outcome, written last
@@ -86,6 +87,7 @@ class Workspace:
         self._remove_database()
 
     def _remove_database(self) -> None:
+        (self.folder / "pairs.txt").unlink(missing_ok=True)
         for suffix in ("", "-journal", "-wal", "-shm"):
             self.database.with_name(self.database.name + suffix).unlink(missing_ok=True)
 

@@ -23,7 +23,7 @@ from service.commands.progress_bar import ProgressBar
 from service.report import Report
 
 OUT = Path("out") / "demo"
-ARTIFACTS = ("scene.glb", "preview.png", "report.json")
+ARTIFACTS = ("scene.glb", "preview.png", "report.json", "capture.json", "capture.png")
 START_TIMEOUT_S = 60.0
 STOP_TIMEOUT_S = 15.0
 

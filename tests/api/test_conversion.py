@@ -15,6 +15,7 @@ from service.report import Report
 from service.settings import ServiceSettings
 from tests.api.captures import capture_files, write_files, zipped
 from tests.api.running import RunningService, Worker
+from tests.unit.posing import room
 
 TINY = {"cells": 8, "patch": 2, "nodes": 16, "voxel_steps": 30, "field_steps": 20, "texel_steps": 20}
 ASSIGNMENTS = [f"{name}={value}" for name, value in TINY.items()]
@@ -81,6 +82,22 @@ def test_preview_is_a_picture_of_something(out: Path) -> None:
     image = np.asarray(Image.open(out / "preview.png"))
     assert image.shape == (512, 512, 3)
     assert image.std() > 0
+
+
+@pytest.mark.slow
+def test_photos_without_poses_become_an_asset_and_are_posed_once(tmp_path: Path) -> None:
+    room.write_photos(tmp_path / "photos", count=9)
+    words = ["convert", str(tmp_path / "photos"), "-o", str(tmp_path / "out"), "--preset", "draft", "--device", "cpu"]
+    words += ["--max-size-px", "120", *(word for assignment in ASSIGNMENTS for word in ("--set", assignment))]
+    reports = []
+    for _ in range(2):
+        assert main(words) == 0
+        reports.append(Report.from_bytes((tmp_path / "out" / "report.json").read_bytes()))
+        assert read_glb((tmp_path / "out" / "scene.glb").read_bytes()).quad_count > 0
+    assert reports[0].views == {"train": 7, "test": 2}
+    assert reports[0].capture["posing"]["registered"] == 9
+    assert set(reports[0].seconds) > {"features", "matching", "mapping"}
+    assert reports[0].capture["posing"] == reports[1].capture["posing"]  # its seconds, too: it was not done again
 
 
 def test_job_of_the_service_gives_the_same_asset(tmp_path: Path, out: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from core.capture import WHITE, Capture
+from core.datasets.budget import PIXEL_BUDGET, budget_notes, within_budget
 from core.datasets.colmap import list_colmap
 from core.datasets.decode import decoded
 from core.datasets.detect import find_source, photos_without_poses
@@ -53,8 +54,12 @@ def read_capture(
     background: tuple[float, float, float] = WHITE,
     skip_missing: bool = False,
     kind: str = AUTO,
+    pixel_budget: int = PIXEL_BUDGET,
 ) -> Capture:
     """A capture from disk in the object frame, its photos undistorted and made smaller by area averaging.
+
+    Memory is bounded: where no `max_size_px` says otherwise, photos are read as small as the budget demands, with a
+    note (core/datasets/budget.py).
 
     Args:
         path, skip_missing: as for `check_capture`, which runs first.
@@ -63,13 +68,18 @@ def read_capture(
             full size, unless `path` names a folder of smaller ones.
         background: sRGB in [0, 1], behind transparent pixels.
         kind: of scene: "auto" (detected), "object", "forward" or "unbounded".
+        pixel_budget: that all photos together may have where `max_size_px` is None.
 
     Raises:
         what `check_capture` raises, and ImageUndecodable, CaptureEmpty, OptionInvalid
     """
     scene_kind = chosen_kind(kind)
-    reduction = Reduction(downscale, max_size_px)
-    listing = check_capture(path, skip_missing=skip_missing, reduction=reduction)
+    asked = Reduction(downscale, max_size_px)
+    found = check_capture(path, skip_missing=skip_missing, reduction=asked)
+    reduction = within_budget(found, asked, pixel_budget)
+    # Again, because there may be a smaller copy of the photos that will do.
+    listing = check_capture(path, skip_missing=skip_missing, reduction=reduction) if reduction != asked else found
     train, test = decoded(listing, reduction)
-    capture = Capture(train, test, background, notes=listing.notes, points=listing.points, kind=scene_kind)
+    notes = listing.notes + budget_notes((found, asked), (listing, reduction), pixel_budget)
+    capture = Capture(train, test, background, notes=notes, points=listing.points, kind=scene_kind)
     return normalised(capture, up_known=listing.up_known)

@@ -47,7 +47,12 @@ def seen_pixels(lens: Lens) -> Iterator[np.ndarray]:
     yield index + right + down
 
 
-@lru_cache(maxsize=4)
+def forget_lookups() -> None:
+    """Frees what is kept for further photos of the same lens: 12 bytes per pixel of up to two lenses."""
+    _lookup.cache_clear()
+
+
+@lru_cache(maxsize=2)  # as many as photos are read at once
 def _lookup(lens: Lens) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Per pinhole pixel [h, w]: flat index (int32) of the upper left of four photo pixels, and the shares (float32)."""
     left, top, right, bottom = inner_frame(lens)

@@ -169,13 +169,6 @@ def test_sizes_below_one_are_refused(tmp_path, options):
         read_capture(synthetic(tmp_path), **options)
 
 
-def test_all_photos_together_are_limited(tmp_path, monkeypatch):
-    monkeypatch.setattr("core.datasets.decode.MAX_TOTAL_PIXELS", 6 * 48 - 1)
-    with pytest.raises(ImageTooLarge, match="6 photos"):
-        read_capture(synthetic(tmp_path))
-    assert read_capture(tmp_path, downscale=2)
-
-
 def test_messages_do_not_show_the_folder(tmp_path):
     synthetic(tmp_path)
     (tmp_path / "train/r_1.png").write_text("hello")

@@ -35,7 +35,7 @@ class Settings:
     voxel_batch: int = 8192
     field_batch: int = 8192
     texel_batch: int = 4096
-    distortion: float = 0.01
+    distortion: float = 0.03
     coverage: float = 0.1
 
     def __post_init__(self) -> None:

@@ -21,6 +21,7 @@ from core.kernels.launch import launch
 BACKGROUND_SHARE = 0.1
 # Pixels within this share of the image's width of the object count as near it.
 NEAR_OBJECT = 0.02
+BLOCK = 4  # pixels per side of what a supersampled batch is drawn in
 
 
 @dataclass(frozen=True)
@@ -68,17 +69,15 @@ class PixelPool:
         return int(self._starts[-1]) if self._pool is None else len(self._pool)
 
     def draw(self, rng: np.random.Generator, count: int, *, supersampled: bool) -> Batch:
-        """`count` pixels: with four sub-rays each, or with one ray through each pixel's centre.
+        """`count` pixels: blocks of 4 x 4 with four sub-rays each, or single ones with one ray through their centre.
 
-        (A ray somewhere within the pixel would learn the mean over the pixel at every place of it: blurred twice. On
-        lego_400 that cost the voxel field 1.25 dB.)
+        Rays of a block meet the same cells and texels, which are then in the processor's cache: a step of the texel
+        stage takes 30 % less time. (A single ray *somewhere* within its pixel would learn the pixel's mean at every
+        place of it, blurred twice: on lego_400 that cost the voxel field 1.25 dB.)
         """
-        index = rng.integers(0, self.size, count)
-        if self._pool is not None:
-            index = self._pool[index].astype(np.int64)
-        image = np.searchsorted(self._starts, index, side="right") - 1
-        local = index - self._starts[image]
-        point = np.stack([local % self._widths[image], local // self._widths[image]], -1) + 0.5
+        image, x, y = self._blocks(rng, count) if supersampled else self._singles(rng, count)
+        index = self._starts[image] + y * self._widths[image] + x
+        point = np.stack([x, y], -1) + 0.5
         images: Any = wp.array(image.astype(np.int32), dtype=wp.int32, device=self.device)
         points: Any = wp.array(point.astype(np.float32), dtype=wp.vec2, device=self.device)
         origins, directions = self._rays(images, points, self._sub_offsets if supersampled else self._no_offset)
@@ -88,6 +87,30 @@ class PixelPool:
         alpha = values[:, 3] if values.shape[1] == 4 else torch.ones_like(values[:, 0])
         photo = torch.from_numpy(image).to(self.device)
         return Batch(origins, directions, centres, values[:, :3] * alpha[:, None], alpha, photo)
+
+    def _singles(self, rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(photo, column, row) [count] of pixels of the pool."""
+        index = rng.integers(0, self.size, count)
+        if self._pool is not None:
+            index = self._pool[index].astype(np.int64)
+        image = np.searchsorted(self._starts, index, side="right") - 1
+        row, column = np.divmod(index - self._starts[image], self._widths[image])
+        return image, column, row
+
+    def _blocks(self, rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `_singles`, but in blocks around pixels of the pool. What does not belong to the pool, or lies outside of
+        the photo, is drawn as the pixel that the block is around."""
+        image, column, row = (np.repeat(a, BLOCK**2) for a in self._singles(rng, -(-count // BLOCK**2)))
+        dy, dx = np.divmod(np.arange(len(image)) % BLOCK**2, BLOCK)
+        x, y = column + dx - BLOCK // 2, row + dy - BLOCK // 2
+        width, first = self._widths[image], self._starts[image]
+        height = (self._starts[image + 1] - first) // width
+        drawn = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+        if self._pool is not None:
+            index = np.where(drawn, first + y * width + x, 0).astype(self._pool.dtype)  # or all of it is converted
+            place = np.minimum(np.searchsorted(self._pool, index), len(self._pool) - 1)
+            drawn &= self._pool[place] == index
+        return image[:count], np.where(drawn, x, column)[:count], np.where(drawn, y, row)[:count]
 
     def _rays(self, images: Any, points: Any, offsets: Any) -> tuple[Tensor, Tensor]:
         n = len(images) * len(offsets)

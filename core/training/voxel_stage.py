@@ -21,8 +21,12 @@ from core.training.marcher import Marcher
 from core.training.pixels import PixelPool
 from core.training.stage import Stage
 
-DENSITY_RATE, FEATURE_RATE, NETWORK_RATE = 0.08, 0.03, 5e-3
-FINAL_RATE = 0.1  # rates fall to this share, exponentially
+# A higher density rate makes surfaces thinner, at the same PSNR (lego_400, 256 nodes, spread of a ray's weight in mesh
+# cells: 0.60 at 0.08, 0.29 at 0.3), and thin surfaces lose less when they become quads: +0.75 dB there. At 1.0 nothing
+# is learned any more (24.2 dB).
+DENSITY_RATE, FEATURE_RATE, NETWORK_RATE = 0.3, 0.03, 5e-3
+# Rates fall to this share, exponentially. 0.03 costs 1 dB in 2000 steps, 0.3 gains 0.2.
+FINAL_RATE = 0.2
 DENSITY_DECAY = 0.05  # empty space must cost something; falls to nothing
 OCCUPANCY_INTERVAL = 100
 SMALLEST_IMAGE_PX = 100

@@ -14,6 +14,7 @@ SHELLS  unbounded: cameras and what they look at lie within the scene's cube [-1
 from dataclasses import dataclass
 
 import numpy as np
+import warp as wp
 
 from core.kernels.space import CUBE, SHELLS, TAPER
 from core.kernels.space import Space as KernelSpace
@@ -114,7 +115,7 @@ class Space:
 
     def kernel_space(self) -> KernelSpace:
         space = KernelSpace()
-        space.kind, space.tangent = self.kind, self.tangent
+        space.kind, space.tangent = self.kind, wp.vec2(*self.tangent)
         space.reach, space.growth, space.inner = self.reach, self.growth, self.inner
         return space
 

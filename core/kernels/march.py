@@ -234,6 +234,6 @@ def survey(
                 wp.atomic_add(mass, part, cell, w)
                 wp.atomic_add(moment, part, cell, w * g)
     if space.kind == SHELLS and left > 1.0e-3:
-        near, far = grid_span(space, origins[r], directions[r], 1.0)
+        _near, far = grid_span(space, origins[r], directions[r], 1.0)
         p = origins[r] + far * directions[r]
         wp.atomic_max(shell_peak, part, nearest_shell_cell(space, p, shells, cells), left)

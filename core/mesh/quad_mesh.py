@@ -1,7 +1,7 @@
 """The quad mesh (paper 3.1): one vertex per kept cell of a P^3 grid, one quad per grid edge between four kept cells.
 
-Around an unbounded scene's cells stand shells: concentric cubes whose faces are cut into P x P quads that stay where they
-are (supplement H).
+Around an unbounded scene's cells stand shells: concentric cubes whose faces are cut into P x P quads that stay where
+they are (supplement H).
 """
 
 from dataclasses import dataclass, field, replace
@@ -137,7 +137,7 @@ def build_mesh(
 
 
 def _shell_quads(space: Space, cells: int, seen: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(vertices [S, 3], quads [n, 4], cells [n]) of the shells' seen quads; faces go by axis, the negative one first."""
+    """(vertices [S, 3], quads [n, 4], cells [n]) of the shells' seen quads; faces by axis, the negative one first."""
     if seen is None or not seen.any():
         return np.zeros((0, 3)), np.zeros((0, CORNERS), np.int64), np.zeros(0, np.int64)
     flat = np.flatnonzero(seen)

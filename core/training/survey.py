@@ -32,8 +32,10 @@ class Survey:
     @classmethod
     def empty(cls, cells: int, shells: int, device: str) -> "Survey":
         parts, n = accumulator_parts(device), cells**3
-        zeros = [torch.zeros(parts, *shape, device=device) for shape in ((n,), (n,), (n, 3))]
-        return cls(cells, shells, *zeros, torch.zeros(parts, (shells + 1) * FACES * cells**2, device=device))
+        peak, mass = torch.zeros(parts, n, device=device), torch.zeros(parts, n, device=device)
+        moment = torch.zeros(parts, n, 3, device=device)
+        shell_peak = torch.zeros(parts, (shells + 1) * FACES * cells**2, device=device)
+        return cls(cells, shells, peak, mass, moment, shell_peak)
 
     def centroids(self) -> np.ndarray:
         """[P^3, 3] float32, where rays saw something in each cell; NaN where they saw nothing."""

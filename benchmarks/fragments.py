@@ -109,7 +109,7 @@ def _boxes(corners: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]
     offset = corners[..., :2] * np.array([1.0, -1.0])
     with np.errstate(divide="ignore", invalid="ignore"):
         projected = np.array(camera.centre_px) + np.array(camera.focal_px) * offset / depth
-    ahead, somewhere = (depth > 0).all((1, 2)), (depth > 0).any((1, 2))
+    ahead, somewhere = np.all(depth > 0, (1, 2)), np.any(depth > 0, (1, 2))
     size = np.array(camera.size_px)
     low = np.where(ahead[:, None], projected.min(1), 0.0)
     high = np.where(ahead[:, None], projected.max(1), size)

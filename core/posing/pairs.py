@@ -55,7 +55,7 @@ def likely_pairs(scores: np.ndarray) -> set[Pair]:
 
 
 def likeness(directions: list[np.ndarray], done: Callable[[float], None] = lambda share: None) -> np.ndarray:
-    """[n, n] int: mutual best matches of unit descriptors [k, 128] that also pass the ratio test. 0.5 ms a pair."""
+    """[n, n] int: mutual best matches of unit descriptors [k, 128] that also pass the ratio test. 0.8 ms a pair."""
     count = len(directions)
     scores = np.zeros((count, count), np.int32)
     for a in range(count):

@@ -38,7 +38,7 @@ class Posing:
         cameras: number of lenses.
         points: number of sparse points.
         error_px: mean reprojection error of the points, in pixels of the photos.
-        seconds: per stage (features, matching, mapping).
+        seconds: per stage (features, matching, mapping), of interrupted runs, too.
         notes: remarks for the user.
     """
 

@@ -56,7 +56,7 @@ class _Run:
     ) -> None:
         self.photos, self.numbers, self.workspace, self.seed = photos, numbers, workspace, seed
         self._progress = progress
-        self._seconds: dict[str, float] = {}
+        self._seconds = workspace.seconds()
 
     def posing(self) -> Posing:
         database = self.workspace.database
@@ -102,11 +102,13 @@ class _Run:
     @contextmanager
     def _stage(self, name: str) -> Iterator[Callable[[float], None]]:
         start, end = STAGES[name]
+        before, began = self._seconds.get(name, 0.0), time.monotonic()
 
         def done(share: float) -> None:
+            self._seconds[name] = before + time.monotonic() - began
+            self.workspace.keep_seconds(self._seconds)
             self._progress(Progress(name, start + (end - start) * share))
 
         done(0.0)
-        began = time.monotonic()
         yield done
-        self._seconds[name] = time.monotonic() - began
+        self._seconds[name] = before + time.monotonic() - began

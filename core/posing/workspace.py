@@ -6,6 +6,7 @@ database.db      COLMAP's: features and matches, each written when it is found; 
 pairs.txt        the pairs that it is matching; gone, too
 sparse/0/        the model
 identity.json    what the folder was made from; work for other photos or settings is thrown away
+seconds.json     spent so far; gone, too
 posing.json      the outcome, written last
 """
 
@@ -60,6 +61,13 @@ class Workspace:
         value = read_json(self.folder / "posing.json")
         return Posing.from_json(value, self.folder) if value else None
 
+    def seconds(self) -> dict[str, float]:
+        """Spent on each stage by earlier runs."""
+        return read_json(self.folder / "seconds.json") or {}
+
+    def keep_seconds(self, seconds: dict[str, float]) -> None:
+        self._write("seconds.json", seconds)
+
     def finish(self, posing: Posing) -> None:
         self._write("posing.json", posing.as_json())
         self._remove_database()
@@ -87,7 +95,8 @@ class Workspace:
         self._remove_database()
 
     def _remove_database(self) -> None:
-        (self.folder / "pairs.txt").unlink(missing_ok=True)
+        for name in ("pairs.txt", "seconds.json"):
+            (self.folder / name).unlink(missing_ok=True)
         for suffix in ("", "-journal", "-wal", "-shm"):
             self.database.with_name(self.database.name + suffix).unlink(missing_ok=True)
 

@@ -91,4 +91,4 @@ def test_four_hundred_large_photos_fit(tmp_path):
     fitted = budget.within_budget(many, Reduction())
     total = budget.total_pixels(many, fitted)
     assert 0.98 * budget.PIXEL_BUDGET < total <= budget.PIXEL_BUDGET
-    assert total * budget.BYTES_PER_PIXEL < 3.1 * 2**30  # about half of 6 GiB
+    assert total * budget.BYTES_PER_PIXEL < 2.5 * 2**30  # of 6 GiB

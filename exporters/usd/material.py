@@ -143,20 +143,21 @@ def _materialx(material: UsdShade.Material, graph: Graph) -> UsdShade.Output:
     prim.CreateAttribute("config:mtlx:version", Sdf.ValueTypeNames.String, False).Set(MATERIALX_VERSION)
     container = UsdShade.NodeGraph.Define(prim.GetStage(), material.GetPath().AppendChild(GRAPH_NAME))
     outputs = {node.name: _node(container, node) for node in graph.nodes}
-    for name, node in (("color", graph.color), ("alpha", graph.alpha)):
+    for name, node in (("outColor", graph.color), ("outAlpha", graph.alpha)):  # names that no node has
         container.CreateOutput(name, _TYPES[node.output]).ConnectToSource(outputs[node.name])
     surface = _shader(material, "materialx", "ND_gltf_pbr_surfaceshader")
     constants: dict[str, tuple[str, Any]] = {
         "base_color": ("color3", (0.0, 0.0, 0.0)),
-        "metallic": ("float", 1.0),
+        "metallic": ("float", 0.0),
+        "specular": ("float", 0.0),  # no reflection at any angle
         "roughness": ("float", 1.0),
         "alpha_mode": ("integer", 1),  # masked
         "alpha_cutoff": ("float", ALPHA_THRESHOLD),
     }
     for name, (kind, value) in constants.items():
         surface.CreateInput(name, _TYPES[kind]).Set(_value(kind, value))
-    surface.CreateInput("emissive", Sdf.ValueTypeNames.Color3f).ConnectToSource(container.GetOutput("color"))
-    surface.CreateInput("alpha", Sdf.ValueTypeNames.Float).ConnectToSource(container.GetOutput("alpha"))
+    surface.CreateInput("emissive", Sdf.ValueTypeNames.Color3f).ConnectToSource(container.GetOutput("outColor"))
+    surface.CreateInput("alpha", Sdf.ValueTypeNames.Float).ConnectToSource(container.GetOutput("outAlpha"))
     return surface.CreateOutput("out", Sdf.ValueTypeNames.Token)
 
 

@@ -130,8 +130,11 @@ def _features(b: _Builder) -> list[Node]:
 
 def _direction(b: _Builder) -> Node:
     """(direction, 1): from the camera to the point, unit, in the object frame."""
-    view = b.add("view", "viewdirection_vector3", "vector3", {"space": ("string", "object")})
-    unit = b.add("direction", "normalize_vector3", "vector3", {"in": ("vector3", view)})
+    # Asked for it in object space, MaterialX's GLSL turns the wrong way (1.39.5: by the inverse transpose).
+    world = b.add("view_world", "viewdirection_vector3", "vector3", {"space": ("string", "world")})
+    spaces = {"fromspace": ("string", "world"), "tospace": ("string", "object")}
+    turned = b.add("view_object", "transformvector_vector3", "vector3", {"in": ("vector3", world), **spaces})
+    unit = b.add("direction", "normalize_vector3", "vector3", {"in": ("vector3", turned)})
     with_one = {"in1": ("vector3", unit), "in2": ("float", 1.0)}
     return b.add("direction_and_one", "combine2_vector4VF", "vector4", with_one)
 

@@ -16,9 +16,14 @@ def view_from_object(camera: Camera, world_from_object: np.ndarray | None) -> np
 
 def projection(camera: Camera, model_view: np.ndarray, scene: BakedScene) -> np.ndarray:
     """[4, 4] projectionMatrix of a pinhole whose principal point may be off centre, with tight depth planes."""
+    points = np.concatenate([page.positions for page in scene.pages])
+    return projection_between(camera, *depth_range(model_view, points))
+
+
+def projection_between(camera: Camera, near: float, far: float) -> np.ndarray:
+    """[4, 4] projectionMatrix with given depth planes."""
     width, height = camera.size_px
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
-    near, far = _depth_range(model_view, scene)
     return np.array(
         [
             [2 * fx / width, 0, 1 - 2 * cx / width, 0],
@@ -37,12 +42,10 @@ def object_ray_from_ndc(model_view: np.ndarray, clip: np.ndarray) -> np.ndarray:
     return np.linalg.inv(model_view[:3, :3]) @ view_ray
 
 
-def _depth_range(model_view: np.ndarray, scene: BakedScene) -> tuple[float, float]:
-    """Near and far plane around everything that is in front of the camera."""
-    points = np.concatenate([page.positions for page in scene.pages])
+def depth_range(model_view: np.ndarray, points: np.ndarray) -> tuple[float, float]:
+    """Near and far plane around everything of points [n, 3] that is in front of the camera."""
     depth = -(points @ model_view[2, :3] + model_view[2, 3])
-    low, high = scene.bounds()
     scale = np.cbrt(np.linalg.det(model_view[:3, :3]))
-    nearest = NEAREST_SHARE * scale * np.linalg.norm(high - low)
+    nearest = NEAREST_SHARE * scale * np.linalg.norm(points.max(0) - points.min(0))
     near = max(0.99 * float(depth.min()), nearest)
     return near, max(1.01 * float(depth.max()), 2 * near)

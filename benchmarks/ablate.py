@@ -129,21 +129,22 @@ def main() -> int:
     names = [one.name for one in ABLATIONS if not arguments.rows or any(word in one.name for word in arguments.rows)]
     photos = photo_options_of(arguments)
     overrides = SMALL | dict(text.split("=", 1) for text in arguments.set)
-    rows = []
     try:
         device, base = resolve_device(arguments.device), settings_for(arguments.preset, **overrides)
         for name in names:
             job = (name, arguments.capture, photos, base, device, arguments.seed)
-            rows.append(in_child(train_row, *job))
-            print(f"{rows[-1].psnr:6.2f} dB {rows[-1].seconds:5.0f} s  {name}", flush=True)
+            row = in_child(train_row, *job)
+            print(f"{row.psnr:6.2f} dB {row.seconds:5.0f} s  {name}", flush=True)
+            write_results(arguments.results, [row])
     except PolyfieldError as error:
         sys.exit(f"error [{error.code}]: {error}")
-    everything = merged(
-        arguments.results / JSON_FILE, [asdict(row) for row in rows], lambda row: (row["base"], row["name"])
-    )
-    text = table([AblationRow(**row) for row in everything])
-    (arguments.results / TABLE_FILE).write_text(text, encoding="utf-8")
     return 0
+
+
+def write_results(folder: Path, rows: list[AblationRow]) -> None:
+    everything = merged(folder / JSON_FILE, [asdict(row) for row in rows], lambda row: (row["base"], row["name"]))
+    text = table([AblationRow(**row) for row in everything])
+    (folder / TABLE_FILE).write_text(text, encoding="utf-8")
 
 
 def _arguments() -> argparse.Namespace:

@@ -11,6 +11,7 @@ train.md in the results folder and draws a chart for the capture and device.
 import argparse
 import sys
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -177,30 +178,28 @@ def _curve(row: TrainRow) -> Curve:
 
 def main() -> int:
     arguments = _arguments()
+    rows = []
     try:
-        device = resolve_device(arguments.device)
-        rows = _measured(arguments, device)
+        for row in _measured(arguments, resolve_device(arguments.device)):
+            print(f"{row.setting}: {row.psnr:.2f} dB in {row.seconds:.0f} s", flush=True)
+            rows.append(row)
+            write_results(arguments.results, [row])
     except PolyfieldError as error:
         sys.exit(f"error [{error.code}]: {error}")
-    write_results(arguments.results, rows)
     print(markdown(COLUMNS, [row.cells() for row in rows]))
     return 0
 
 
-def _measured(arguments: argparse.Namespace, device: str) -> list[TrainRow]:
+def _measured(arguments: argparse.Namespace, device: str) -> Iterator[TrainRow]:
     photos = photo_options_of(arguments)
     overrides = dict(text.split("=", 1) for text in arguments.set)
-    rows = []
     for preset in arguments.presets:
         settings = settings_for(preset, **overrides)
-        rows.append(in_child(train_ours, arguments.capture, photos, settings, device, arguments.seed))
-        print(f"{preset}: {rows[-1].psnr:.2f} dB in {rows[-1].seconds:.0f} s", flush=True)
+        yield in_child(train_ours, arguments.capture, photos, settings, device, arguments.seed)
     if arguments.reference_seconds:
         setting = _paper_setting(arguments, device)
         job = (arguments.capture, photos, setting, arguments.reference_seconds, device, arguments.seed)
-        rows.append(in_child(train_paper, *job))
-        print(f"{PAPER}: {rows[-1].psnr:.2f} dB in {rows[-1].seconds:.0f} s", flush=True)
-    return rows
+        yield in_child(train_paper, *job)
 
 
 def _paper_setting(arguments: argparse.Namespace, device: str) -> PaperSetting:

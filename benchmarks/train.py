@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 
 from benchmarks.chart import Curve, draw_chart
 from benchmarks.child_process import gpu_memory_bytes, in_child, peak_memory_bytes
@@ -94,7 +95,8 @@ def train_ours(path: Path, photos: dict[str, Any], settings: Settings, device: s
 def train_paper(
     path: Path, photos: dict[str, Any], setting: PaperSetting, budget_s: float, device: str, seed: int
 ) -> TrainRow:
-    """The paper's setting, for a given time."""
+    """The paper's setting, for a given time; on a GPU with TensorFloat-32, which its authors' did not have."""
+    torch.set_float32_matmul_precision("high")
     capture = read_photos(path, photos)
     run, points = PaperRun(capture, setting, device=device, seed=seed), []
     pixels, gpu_bytes = PAPER_PIXELS[device.partition(":")[0]], 0
@@ -203,11 +205,8 @@ def _measured(arguments: argparse.Namespace, device: str) -> Iterator[TrainRow]:
 
 
 def _paper_setting(arguments: argparse.Namespace, device: str) -> PaperSetting:
-    chosen = {
-        "cells": arguments.reference_cells,
-        "patch": arguments.reference_patch,
-        "batch": arguments.reference_batch,
-    }
+    given = {name: getattr(arguments, f"reference_{name}") for name in ("cells", "patch", "batch")}
+    chosen = {name: value for name, value in given.items() if value is not None}
     base = ON_A_CPU if device == "cpu" else PaperSetting()
     return replace(base, prune=arguments.reference_pruning, **chosen)
 

@@ -10,7 +10,7 @@ from torch import Tensor
 from benchmarks.reference_setting.training import PaperRun
 from core.baked import BakedScene
 from core.baking.pages import pack_pages
-from core.conventions import bytes_from_features
+from core.conventions import FEATURE_CHANNELS, bytes_from_features
 from core.errors import TrainingFailed
 from core.field.network import baked_network
 from core.mesh.quad_mesh import patch_weights
@@ -88,7 +88,7 @@ def _texel_values(network: Callable[[Tensor], Tensor], corners: Tensor, K: int) 
 def _seen(run: PaperRun, quads: _Quads) -> Tensor:
     """Indices of the quads that some training photo sees."""
     opaque = quads.opaque.cpu().numpy()
-    blank = bytes_from_features(np.ones((*opaque.shape, 8)), opaque)
+    blank = np.repeat(opaque[..., None].astype(np.uint8), FEATURE_CHANNELS, -1)
     scene = _scene(run, quads, blank, np.zeros((*opaque.shape, 3), np.uint8))
     rasteriser = Rasteriser(scene, run.device)
     first_quad = np.cumsum([0, *(len(page.triangles) // 2 for page in scene.pages)])

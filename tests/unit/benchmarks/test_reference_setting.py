@@ -190,19 +190,19 @@ def capture():
     return capture_of(ball(), views=12)
 
 
-def test_stage_1_learns_a_ball(capture, monkeypatch):
+def test_stage_1_learns_a_ball(capture, monkeypatch, device):
     monkeypatch.setattr(networks, "OPACITY_BIAS", -4.0)  # rises to something in 60 steps
-    run, steps = PaperRun(capture, TOY, device="cpu"), 60
+    run, steps = PaperRun(capture, TOY, device=device), 60
     for step in range(steps):
         run.step(Moment(step, STAGE1_UNTIL * step / steps))
     # The background alone is at 11.6 dB.
     assert run.held_out_psnr(Moment(0, 0.0), 1024) > 13.0
 
 
-def test_the_baked_scene_shows_what_the_networks_say(capture, monkeypatch):
+def test_the_baked_scene_shows_what_the_networks_say(capture, monkeypatch, device):
     monkeypatch.setattr(networks, "OPACITY_BIAS", 0.0)
-    run = PaperRun(capture, replace(TOY, patch=17), device="cpu")
-    everywhere = torch.rand(512, 3, generator=torch.Generator().manual_seed(0)) * 2.0 - 1.0
+    run = PaperRun(capture, replace(TOY, patch=17), device=device)
+    everywhere = (torch.rand(512, 3, generator=torch.Generator().manual_seed(0)) * 2.0 - 1.0).to(device)
     with torch.no_grad():  # untrained, but opaque here and there
         run.networks.A.head.weight.mul_(100.0)
         run.networks.A.head.bias.sub_(run.networks.A(everywhere).mean())

@@ -60,9 +60,9 @@ LIMITS: dict[str, tuple[float, float]] = {
 }
 
 PRESETS: dict[str, Settings] = {
-    "draft": Settings("draft", cells=64, patch=5, nodes=96, voxel_steps=800, field_steps=250, texel_steps=500),
+    "draft": Settings("draft", cells=64, patch=5, nodes=128, voxel_steps=800, field_steps=300, texel_steps=500),
     "balanced": Settings(
-        "balanced", cells=96, patch=7, nodes=160, voxel_steps=2000, field_steps=1000, texel_steps=4000
+        "balanced", cells=96, patch=7, nodes=256, voxel_steps=2600, field_steps=1600, texel_steps=4500
     ),
     "high": Settings("high", cells=128, patch=9, nodes=256, voxel_steps=8000, field_steps=4000, texel_steps=12000),
 }

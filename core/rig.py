@@ -99,11 +99,10 @@ class Rig:
 
     @cached_property
     def advance(self) -> float:
-        """How far the foremost camera is in front of the hindmost, along the mean axis (0 without one)."""
+        """How far the foremost camera is in front of the cameras' middle, along the mean axis (0 without one)."""
         if self.mean_axis is None or self.spread == 0:
             return 0.0
-        along = self.positions @ self.mean_axis
-        return float(along.max() - along.min())
+        return float(((self.positions - self.middle) @ self.mean_axis).max())
 
     @cached_property
     def looked_at(self) -> np.ndarray:

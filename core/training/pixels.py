@@ -21,7 +21,7 @@ from core.kernels.launch import launch
 BACKGROUND_SHARE = 0.1
 # Pixels within this share of the image's width of the object count as near it.
 NEAR_OBJECT = 0.02
-BLOCK = 4  # pixels per side of what a supersampled batch is drawn in
+BLOCK = 2  # pixels per side of what a supersampled batch is drawn in
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class PixelPool:
         return int(self._starts[-1]) if self._pool is None else len(self._pool)
 
     def draw(self, rng: np.random.Generator, count: int, *, supersampled: bool) -> Batch:
-        """`count` pixels: blocks of 4 x 4 with four sub-rays each, or single ones with one ray through their centre.
+        """`count` pixels: blocks of 2 x 2 with four sub-rays each, or single ones with one ray through their centre.
 
         Rays of a block meet the same cells and texels, which are then in the processor's cache: a step of the texel
         stage takes 30 % less time. (A single ray *somewhere* within its pixel would learn the pixel's mean at every

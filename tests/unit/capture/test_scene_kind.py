@@ -32,14 +32,14 @@ def test_cameras_one_behind_the_other_are_not_forward_facing():
     assert capture_of(poses).kind.name == UNBOUNDED
 
 
-@pytest.mark.parametrize(("near", "name"), [(3.0, FORWARD), (1.0, UNBOUNDED)])
+@pytest.mark.parametrize(("near", "name"), [(3.0, FORWARD), (0.5, UNBOUNDED)])
 def test_no_camera_may_stand_in_what_another_sees(near, name):
     poses = [facing((i, 0.4 * i, 0), (0, 1, 0)) for i in range(6)]
     kind = capture_of(poses, depth_range=(near, 20.0)).kind
     assert kind.name == name
 
 
-@pytest.mark.parametrize(("distance", "name"), [(6.0, FORWARD), (2.0, UNBOUNDED)])
+@pytest.mark.parametrize(("distance", "name"), [(6.0, FORWARD), (0.5, UNBOUNDED)])
 def test_points_tell_where_content_begins(distance, name):
     poses = [facing((i, 0.4 * i, 0), (0, 1, 0)) for i in range(6)]
     points = np.random.default_rng(0).uniform(-1, 1, (200, 3)) + np.array([2.5, distance + 1, 0])

@@ -32,7 +32,7 @@ from core.training.voxel_stage import VoxelStage
 STAGE_SHARES = {"voxels": 0.20, "field": 0.22, "texels": 0.52, "bake": 0.06}
 REPORT_INTERVAL_S = 0.5
 # To be raised when a stage keeps other things: checkpoints of another format are ignored, not misread.
-CHECKPOINT_FORMAT = 2
+CHECKPOINT_FORMAT = 3
 PREVIEW_INTERVAL_S = 20.0
 MAX_SEED = 2**31 - 1
 

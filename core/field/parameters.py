@@ -14,31 +14,47 @@ from core.kernels.types import vec8
 
 @dataclass
 class Parameters:
-    """Trainable entries.
+    """Entries of which some train. A large grid is mostly air: only what trains has moments and gradients.
 
     Attributes:
         scalar: [n] float32, opacity in [0, 1] or raw density.
         features: [n, 8] float32 in [0, 1].
-        moments: Adam's first and second moments of scalar and features.
-        gradients: accumulators of scalar [parts, n] and features [parts, n, 8]; zero between steps.
+        trained: [m] int32, the entries that train, rising; their places here are their rows.
+        row_of: [n] int32, each entry's row, or -1.
+        moments: Adam's first and second moments of the rows' scalars [m] and features [m, 8].
+        gradients: accumulators of scalar [parts, m] and features [parts, m, 8]; zero between steps.
     """
 
     scalar: Tensor
     features: Tensor
+    trained: Tensor
+    row_of: Tensor
     moments: tuple[Tensor, Tensor, Tensor, Tensor]
     gradients: tuple[Tensor, Tensor]
 
     @classmethod
-    def starting_from(cls, scalar: Tensor, features: Tensor) -> "Parameters":
-        """Fresh moments. Untouched zero pages cost no memory, so large arrays may be mostly empty."""
+    def starting_from(cls, scalar: Tensor, features: Tensor, trained: Tensor | None = None) -> "Parameters":
+        """Fresh moments. Args: trained: [m] int32, rising; None: every entry."""
         n, device = len(scalar), scalar.device
-        parts = accumulator_parts(str(device))
+        if trained is None:
+            trained = torch.arange(n, dtype=torch.int32, device=device)
+        m, parts = len(trained), accumulator_parts(str(device))
 
         def zeros(*shape: int) -> Tensor:
             return torch.zeros(shape, dtype=torch.float32, device=device)
 
-        moments = (zeros(n), zeros(n), zeros(n, FEATURE_CHANNELS), zeros(n, FEATURE_CHANNELS))
-        return cls(scalar, features, moments, (zeros(parts, n), zeros(parts, n, FEATURE_CHANNELS)))
+        moments = (zeros(m), zeros(m), zeros(m, FEATURE_CHANNELS), zeros(m, FEATURE_CHANNELS))
+        gradients = zeros(parts, m), zeros(parts, m, FEATURE_CHANNELS)
+        return cls(scalar, features, trained, _rows_of(trained, n), moments, gradients)
+
+    def training(self, trained: Tensor) -> "Parameters":
+        """The same entries, of which others train; those that go on training keep their moments."""
+        fresh = Parameters.starting_from(self.scalar, self.features, trained)
+        before = self.row_of[trained.long()].long()
+        stays = before >= 0
+        for new, old in zip(fresh.moments, self.moments, strict=True):
+            new[stays] = old[before[stays]]
+        return fresh
 
     @property
     def parts(self) -> int:
@@ -59,14 +75,23 @@ class Parameters:
         state.moment2 = wp.from_torch(self.moments[3], dtype=vec8)
         return state
 
-    def rows(self, index: Tensor) -> dict[str, Tensor]:
-        """What a checkpoint keeps of some entries."""
-        moments = {f"m{i}": moment[index] for i, moment in enumerate(self.moments)}
+    def rows(self) -> dict[str, Tensor]:
+        """What a checkpoint keeps: the entries that train."""
+        index = self.trained.long()
+        moments = {f"m{i}": moment for i, moment in enumerate(self.moments)}
         return {"scalar": self.scalar[index], "features": self.features[index], **moments}
 
-    def restore_rows(self, index: Tensor, rows: dict[str, Tensor]) -> None:
-        """Puts back what `rows` returned."""
+    def restore_rows(self, rows: dict[str, Tensor]) -> None:
+        """Puts back what `rows` returned, into parameters of which the same entries train."""
+        index = self.trained.long()
         self.scalar[index] = rows["scalar"].to(self.scalar.device)
         self.features[index] = rows["features"].to(self.scalar.device)
         for i, moment in enumerate(self.moments):
-            moment[index] = rows[f"m{i}"].to(moment.device)
+            moment.copy_(rows[f"m{i}"])
+
+
+def _rows_of(trained: Tensor, n: int) -> Tensor:
+    """[n] int32: the row of each entry, -1 of those that do not train."""
+    rows = torch.full((n,), -1, dtype=torch.int32, device=trained.device)
+    rows[trained.long()] = torch.arange(len(trained), dtype=torch.int32, device=trained.device)
+    return rows

@@ -33,16 +33,14 @@ class VoxelField:
     """Attributes:
     space: where the grid lies.
     nodes: per axis.
-    parameters: of nodes^3 entries, scalar = raw density.
+    parameters: of nodes^3 entries, scalar = raw density. Only nodes that samples in occupied cells may read train.
     occupied: [cells, cells, cells] bool.
-    active: indices (int32) of the nodes near occupied cells; the only ones that train.
     """
 
     space: Space
     nodes: int
     parameters: Parameters
     occupied: Tensor
-    active: Tensor
 
     @classmethod
     def new(cls, space: Space, nodes: int, hull: np.ndarray, seed: int, device: str) -> "VoxelField":
@@ -51,9 +49,10 @@ class VoxelField:
         noise = torch.randn(n, FEATURE_CHANNELS, generator=generator)
         density = torch.full((n,), INITIAL_DENSITY)
         density[torch.from_numpy(space.backdrop(nodes)).reshape(-1)] = BACKDROP_DENSITY
-        parameters = Parameters.starting_from(density.to(device), (0.5 + 0.02 * noise).to(device))
         occupied = torch.from_numpy(hull.copy()).to(device)
-        return cls(space, nodes, parameters, occupied, _active_nodes(occupied, nodes))
+        features = (0.5 + 0.02 * noise).to(device)
+        parameters = Parameters.starting_from(density.to(device), features, _active_nodes(occupied, nodes))
+        return cls(space, nodes, parameters, occupied)
 
     @property
     def step(self) -> float:
@@ -71,8 +70,9 @@ class VoxelField:
         grid = old.T.reshape(1, -1, self.nodes, self.nodes, self.nodes)
         fine = functional.interpolate(grid, size=(nodes,) * 3, mode="trilinear", align_corners=True)
         fine = fine[0].reshape(1 + FEATURE_CHANNELS, -1)
-        parameters = Parameters.starting_from(fine[0].contiguous(), fine[1:].T.contiguous())
-        return VoxelField(self.space, nodes, parameters, self.occupied, _active_nodes(self.occupied, nodes))
+        active = _active_nodes(self.occupied, nodes)
+        parameters = Parameters.starting_from(fine[0].contiguous(), fine[1:].T.contiguous(), active)
+        return VoxelField(self.space, nodes, parameters, self.occupied)
 
     def update_occupancy(self, cells: int, hull: np.ndarray) -> None:
         """Drops what is empty: cells whose averaged density is low, and cells outside of the hull."""
@@ -85,7 +85,7 @@ class VoxelField:
         occupied = _over_neighbours(found, torch.logical_or, False)
         occupied |= torch.from_numpy(self.space.backdrop(cells)).to(occupied.device)
         self.occupied = occupied & _on_grid(torch.from_numpy(hull).to(occupied.device), cells)
-        self.active = _active_nodes(self.occupied, n)
+        self.parameters = self.parameters.training(_active_nodes(self.occupied, n))
 
     def grid(self) -> VoxelGrid:
         """The field as kernels read it."""
@@ -94,6 +94,7 @@ class VoxelField:
         grid.nodes, grid.cells = self.nodes, self.occupied.shape[0]
         grid.density = wp.from_torch(self.parameters.scalar)
         grid.features = self.parameters.feature_state().value
+        grid.row_of = wp.from_torch(self.parameters.row_of)
         grid.occupied = wp.from_torch(self.occupied.to(torch.uint8).reshape(-1).contiguous())
         grid.step, grid.density_scale = self.step, DENSITY_SCALE
         return grid

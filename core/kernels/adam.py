@@ -18,7 +18,7 @@ EPSILON = wp.constant(1.0e-12)
 @wp.struct
 class ScalarState:
     value: wp.array(dtype=float)
-    grad: wp.array2d(dtype=float)  # [parts, entries]
+    grad: wp.array2d(dtype=float)  # [parts, rows]
     moment1: wp.array(dtype=float)
     moment2: wp.array(dtype=float)
 
@@ -32,32 +32,35 @@ class FeatureState:
 
 
 @wp.func
-def update_scalar(s: ScalarState, i: int, rate: float, decay: float, low: float, high: float, bias: wp.vec2):
-    """One step of entry i: value -= rate * (m / sqrt(v) + decay), within [low, high]; its gradient is cleared."""
+def update_scalar(s: ScalarState, i: int, row: int, rate: float, decay: float, low: float, high: float, bias: wp.vec2):
+    """One step of entry i, whose gradient and moments are in `row`, within [low, high]; its gradient is cleared.
+
+    value -= rate * (m / sqrt(v) + decay)
+    """
     g = float(0.0)
     for p in range(s.grad.shape[0]):
-        g += s.grad[p, i]
-        s.grad[p, i] = 0.0
-    m = BETA1 * s.moment1[i] + (1.0 - BETA1) * g
-    v = BETA2 * s.moment2[i] + (1.0 - BETA2) * g * g
-    s.moment1[i] = m
-    s.moment2[i] = v
+        g += s.grad[p, row]
+        s.grad[p, row] = 0.0
+    m = BETA1 * s.moment1[row] + (1.0 - BETA1) * g
+    v = BETA2 * s.moment2[row] + (1.0 - BETA2) * g * g
+    s.moment1[row] = m
+    s.moment2[row] = v
     m_hat = m / bias[0]
     v_hat = v / bias[1]
     s.value[i] = wp.clamp(s.value[i] - rate * (m_hat / (wp.sqrt(v_hat) + EPSILON) + decay), low, high)
 
 
 @wp.func
-def update_features(s: FeatureState, i: int, rate: float, bias: wp.vec2):
+def update_features(s: FeatureState, i: int, row: int, rate: float, bias: wp.vec2):
     """One step of the eight features of entry i, within [0, 1], channel 0 from 1/255 (0 is a hole)."""
     g = vec8()
     for p in range(s.grad.shape[0]):
-        g += s.grad[p, i]
-        s.grad[p, i] = vec8()
-    m = BETA1 * s.moment1[i] + (1.0 - BETA1) * g
-    v = BETA2 * s.moment2[i] + (1.0 - BETA2) * wp.cw_mul(g, g)
-    s.moment1[i] = m
-    s.moment2[i] = v
+        g += s.grad[p, row]
+        s.grad[p, row] = vec8()
+    m = BETA1 * s.moment1[row] + (1.0 - BETA1) * g
+    v = BETA2 * s.moment2[row] + (1.0 - BETA2) * wp.cw_mul(g, g)
+    s.moment1[row] = m
+    s.moment2[row] = v
     scale1 = rate / bias[0]
     scale2 = 1.0 / bias[1]
     x = s.value[i]
@@ -70,7 +73,7 @@ def update_features(s: FeatureState, i: int, rate: float, bias: wp.vec2):
 @wp.kernel
 def adam_grid(
     first: int,
-    active: wp.array(dtype=wp.int32),
+    trained: wp.array(dtype=wp.int32),  # [rows]
     touched: wp.array(dtype=wp.uint8),
     scalars: ScalarState,
     features: FeatureState,
@@ -81,13 +84,14 @@ def adam_grid(
     high: float,
     bias: wp.vec2,
 ):
-    """Steps the touched ones among the active nodes of a grid."""
-    i = active[first + wp.tid()]
-    if touched[i] == wp.uint8(0):
+    """Steps the touched ones among the rows of a grid."""
+    row = first + wp.tid()
+    if touched[row] == wp.uint8(0):
         return
-    touched[i] = wp.uint8(0)
-    update_scalar(scalars, i, scalar_rate, scalar_decay, low, high, bias)
-    update_features(features, i, feature_rate, bias)
+    touched[row] = wp.uint8(0)
+    i = trained[row]
+    update_scalar(scalars, i, row, scalar_rate, scalar_decay, low, high, bias)
+    update_features(features, i, row, feature_rate, bias)
 
 
 @wp.kernel
@@ -112,8 +116,8 @@ def adam_texels(
     k = float(updates[i])
     bias = wp.vec2(1.0 - wp.pow(BETA1, k), 1.0 - wp.pow(BETA2, k))
     if scalar_rate > 0.0:
-        update_scalar(scalars, i, scalar_rate, 0.0, 0.0, 1.0, bias)
-    update_features(features, i, feature_rate, bias)
+        update_scalar(scalars, i, i, scalar_rate, 0.0, 0.0, 1.0, bias)
+    update_features(features, i, i, feature_rate, bias)
 
 
 @wp.kernel

@@ -42,6 +42,7 @@ class VoxelGrid:
     nodes: int  # per axis
     density: wp.array(dtype=float)  # raw, [nodes^3]
     features: wp.array(dtype=vec8)  # [nodes^3]
+    row_of: wp.array(dtype=wp.int32)  # [nodes^3], where a node's gradient goes, or -1
     cells: int  # of the occupancy grid, per axis
     occupied: wp.array(dtype=wp.uint8)  # [cells^3]
     step: float
@@ -157,7 +158,7 @@ def march_backward(
     grad_A: wp.array(dtype=float),
     distortion: float,
     part: int,
-    grad_density: wp.array2d(dtype=float),  # [parts, nodes^3]
+    grad_density: wp.array2d(dtype=float),  # [parts, rows]
     grad_features: wp.array2d(dtype=vec8),
     touched: wp.array(dtype=wp.uint8),
 ):
@@ -194,12 +195,13 @@ def march_backward(
         grad_raw = grad_alpha * (1.0 - a) * grid.step * grid.density_scale
         base, f = node_of(to_grid(grid.space, o + samples.t[r, n] * d), grid.nodes)
         for c in range(8):
-            node = base + corner_offset(c, grid.nodes)
-            weight = corner_weight(c, f)
-            wp.atomic_add(grad_density, part, node, weight * grad_raw)
-            if w > MIN_FEATURE_WEIGHT:
-                wp.atomic_add(grad_features, part, node, (weight * w) * gF)
-            touched[node] = wp.uint8(1)
+            row = grid.row_of[base + corner_offset(c, grid.nodes)]
+            if row >= 0:
+                weight = corner_weight(c, f)
+                wp.atomic_add(grad_density, part, row, weight * grad_raw)
+                if w > MIN_FEATURE_WEIGHT:
+                    wp.atomic_add(grad_features, part, row, (weight * w) * gF)
+                touched[row] = wp.uint8(1)
 
 
 @wp.kernel

@@ -25,7 +25,8 @@ class Volume:
 
 @wp.struct
 class VolumeGradients:
-    alpha: wp.array2d(dtype=float)  # [parts, nodes^3]
+    row_of: wp.array(dtype=wp.int32)  # [nodes^3], where a node's gradient goes, or -1
+    alpha: wp.array2d(dtype=float)  # [parts, rows]
     features: wp.array2d(dtype=vec8)
     touched: wp.array(dtype=wp.uint8)
     vertices: wp.array2d(dtype=wp.vec3)  # [parts, vertices]
@@ -89,9 +90,11 @@ def volume_scatter(
     for c in range(8):
         node = base + corner_offset(c, volume.nodes)
         weight = corner_weight(c, f)
-        wp.atomic_add(gradients.alpha, part, node, weight * grad_alpha)
-        wp.atomic_add(gradients.features, part, node, weight * grad_features)
-        gradients.touched[node] = wp.uint8(1)
+        row = gradients.row_of[node]
+        if row >= 0:
+            wp.atomic_add(gradients.alpha, part, row, weight * grad_alpha)
+            wp.atomic_add(gradients.features, part, row, weight * grad_features)
+            gradients.touched[row] = wp.uint8(1)
         value = grad_alpha * volume.alpha[node] + wp.dot(grad_features, volume.features[node])
         wx = wp.where((c & 4) != 0, f[0], 1.0 - f[0])
         wy = wp.where((c & 2) != 0, f[1], 1.0 - f[1])

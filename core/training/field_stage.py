@@ -52,7 +52,6 @@ class FieldStage(Stage):
         pool: PixelPool,
         mesh: QuadMesh,
         nodes: int,
-        active: Tensor,
         parameters: Parameters,
         network: nn.Sequential,
         settings: Settings,
@@ -60,12 +59,12 @@ class FieldStage(Stage):
         device: str,
     ) -> None:
         super().__init__(network, settings, settings.field_steps, seed, device)
-        self.mesh, self.nodes, self.active, self.parameters = mesh, nodes, active, parameters
+        self.mesh, self.nodes, self.parameters = mesh, nodes, parameters
         self.seen = torch.zeros(len(mesh.quads), dtype=torch.bool, device=device)
         self._pool = pool
         self._tracer = Tracer(mesh, VOLUME_KERNELS, settings.field_batch, 1, HIT_CAPACITY)
         self._volume = volume_of(mesh.space, nodes, parameters)
-        self._touched = torch.zeros(nodes**3, dtype=torch.uint8, device=device)
+        self._touched = torch.zeros(len(parameters.trained), dtype=torch.uint8, device=device)
         parts = accumulator_parts(device)
         self._vertex_grad = torch.zeros(parts, *mesh.vertices.shape, device=device)
         self._vertex_moments = (torch.zeros_like(mesh.vertices), torch.zeros_like(mesh.vertices))
@@ -83,9 +82,9 @@ class FieldStage(Stage):
         alpha = 1.0 - torch.exp(-density * (DENSITY_SCALE * mesh.cell_size * mesh.space.inner))
         backdrop = torch.from_numpy(mesh.space.backdrop(voxels.field.nodes)).reshape(-1)
         alpha[backdrop.to(device)] = 1.0
-        parameters = Parameters.starting_from(alpha, voxels.field.parameters.features)
-        nodes, active = voxels.field.nodes, voxels.field.active
-        return cls(pool, mesh, nodes, active, parameters, voxels.network, settings, voxels.seed, device)
+        learned = voxels.field.parameters
+        parameters = Parameters.starting_from(alpha, learned.features, learned.trained)
+        return cls(pool, mesh, voxels.field.nodes, parameters, voxels.network, settings, voxels.seed, device)
 
     @classmethod
     def restored(
@@ -98,14 +97,15 @@ class FieldStage(Stage):
         seed: int,
         device: str,
     ) -> "FieldStage":
-        nodes, active = state["nodes"], state["active"].to(device)
+        nodes, trained = state["nodes"], state["trained"].to(device)
         n = nodes**3
-        parameters = Parameters.starting_from(torch.zeros(n, device=device), torch.zeros(n, 8, device=device))
-        parameters.restore_rows(active.long(), state["rows"])
+        nothing = torch.zeros(n, device=device), torch.zeros(n, 8, device=device)
+        parameters = Parameters.starting_from(*nothing, trained)
+        parameters.restore_rows(state["rows"])
         vertices = state["vertices"].to(device)
         kept, quads, shell_cells = (state[name].numpy() for name in ("kept", "quads", "shell_cells"))
         mesh = QuadMesh(settings.cells, kept, vertices, quads, space, shell_cells)
-        stage = cls(pool, mesh, nodes, active, parameters, network, settings, seed, device)
+        stage = cls(pool, mesh, nodes, parameters, network, settings, seed, device)
         stage.restore(state)
         return stage
 
@@ -126,7 +126,7 @@ class FieldStage(Stage):
         soft, hard = (tuple(self.gradient(x, len(A)) for x in pair) for pair in ((F, A), (F_binary, A_binary)))
         self._tracer.backward(batch, self._volume, soft, hard, self._gradients, self.parameters.parts)
         rates = (ALPHA_RATE * falling, FEATURE_RATE * falling)
-        step_grid(self.parameters, wp.from_torch(self.active), self._touched, rates, 0.0, (0.0, 1.0),
+        step_grid(self.parameters, self._touched, rates, 0.0, (0.0, 1.0),
                   self.done + 1, self.device)  # fmt: skip
         self._step_vertices(VERTEX_RATE * self.mesh.cell_size * falling)
         if self.fraction >= PRUNING_STARTS or self.done + 1 == self.steps:
@@ -146,6 +146,7 @@ class FieldStage(Stage):
     def _kernel_gradients(self) -> VolumeGradients:
         gradients = VolumeGradients()
         alpha, features = self.parameters.gradients
+        gradients.row_of = wp.from_torch(self.parameters.row_of)
         gradients.alpha, gradients.features = wp.from_torch(alpha), wp.from_torch(features, dtype=vec8)
         gradients.touched = wp.from_torch(self._touched)
         gradients.vertices = as_vec3(self._vertex_grad)
@@ -154,8 +155,8 @@ class FieldStage(Stage):
     def own_state(self) -> dict[str, Any]:
         return {
             "nodes": self.nodes,
-            "active": self.active,
-            "rows": self.parameters.rows(self.active.long()),
+            "trained": self.parameters.trained,
+            "rows": self.parameters.rows(),
             "kept": torch.from_numpy(self.mesh.kept),
             "quads": torch.from_numpy(self.mesh.quads),
             "shell_cells": torch.from_numpy(self.mesh.shell_cells),

@@ -1,7 +1,5 @@
 """Marches batches of rays through a voxel field and back, with buffers that grow where a ray needs more samples."""
 
-from typing import Any
-
 import torch
 import warp as wp
 from torch import Tensor
@@ -25,13 +23,12 @@ class Marcher:
         self.field, self.device = field, device
         self._capacity = min(FIRST_CAPACITY, field.max_samples())
         self._rays = 0
-        self._touched = torch.zeros(field.nodes**3, dtype=torch.uint8, device=device)
         self.refresh()
 
     def refresh(self) -> None:
         """To be called when the field's occupancy has changed."""
         self._grid = self.field.grid()
-        self._active = wp.from_torch(self.field.active)
+        self._touched = torch.zeros(len(self.field.parameters.trained), dtype=torch.uint8, device=self.device)
 
     def forward(self, origins: Tensor, directions: Tensor, jitter: Tensor) -> tuple[Tensor, Tensor]:
         """Features times opacity [n, 8] and opacity [n] along rays [n, 3]; jitter [n] in [0, 1) moves the samples."""
@@ -69,7 +66,7 @@ class Marcher:
         launch(survey, len(origins), lambda part: [*shared, part, *outputs], self.device, found.peak.shape[0])
 
     def adam(self, rates: tuple[float, float], decay: float, bounds: tuple[float, float], steps: int) -> None:
-        step_grid(self.field.parameters, self._active, self._touched, rates, decay, bounds, steps, self.device)
+        step_grid(self.field.parameters, self._touched, rates, decay, bounds, steps, self.device)
 
     def _allocate(self, rays: int) -> None:
         self._rays = rays
@@ -88,7 +85,6 @@ class Marcher:
 
 def step_grid(
     parameters: Parameters,
-    active: Any,
     touched: Tensor,
     rates: tuple[float, float],
     decay: float,
@@ -96,9 +92,10 @@ def step_grid(
     steps: int,
     device: str,
 ) -> None:
-    """One Adam step of the touched active nodes. Args: rates: of scalar and features. bounds: of the scalar."""
+    """One Adam step of the touched rows. Args: rates: of scalar and features. bounds: of the scalar."""
     inputs = [
-        active, wp.from_torch(touched), parameters.scalar_state(), parameters.feature_state(),
+        wp.from_torch(parameters.trained), wp.from_torch(touched),
+        parameters.scalar_state(), parameters.feature_state(),
         rates[0], rates[1], decay, bounds[0], bounds[1], bias_correction(steps),
     ]  # fmt: skip
-    launch(adam_grid, len(active), inputs, device)
+    launch(adam_grid, len(parameters.trained), inputs, device)

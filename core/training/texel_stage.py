@@ -97,7 +97,7 @@ class TexelStage(Stage):
         mesh = QuadMesh(settings.cells, kept, state["vertices"].to(device), quads, space, shell_cells)
         n = len(state["rows"]["scalar"])
         parameters = Parameters.starting_from(torch.zeros(n, device=device), torch.zeros(n, 8, device=device))
-        parameters.restore_rows(torch.arange(n, device=device), state["rows"])
+        parameters.restore_rows(state["rows"])
         stage = cls(pool, mesh, parameters, network, settings, seed, device)
         stage.restore(state)
         return stage
@@ -141,9 +141,8 @@ class TexelStage(Stage):
             launch(adam_texels, count, inputs, self.device)
 
     def own_state(self) -> dict[str, Any]:
-        everything = torch.arange(len(self.parameters.scalar), device=self.device)
         return {
-            "rows": self.parameters.rows(everything),
+            "rows": self.parameters.rows(),
             "updates": self._updates,
             "kept": torch.from_numpy(self.mesh.kept),
             "quads": torch.from_numpy(self.mesh.quads),

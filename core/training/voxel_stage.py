@@ -107,19 +107,19 @@ class VoxelStage(Stage):
         self.marcher.refresh()
 
     def own_state(self) -> dict[str, Any]:
-        index = self.field.active.long()
         return {
             "nodes": self.field.nodes,
             "steps_here": self._steps_here,
             "occupied": self.field.occupied,
-            "active": self.field.active,
-            "rows": self.field.parameters.rows(index),
+            "trained": self.field.parameters.trained,
+            "rows": self.field.parameters.rows(),
         }
 
     def restore_own(self, state: dict[str, Any]) -> None:
         field = VoxelField.new(self.region.space, state["nodes"], self.region.hull, self.seed, self.device)
         field.parameters.scalar.fill_(EMPTY_DENSITY)
-        field.occupied, field.active = state["occupied"].to(self.device), state["active"].to(self.device)
-        field.parameters.restore_rows(field.active.long(), state["rows"])
+        field.occupied = state["occupied"].to(self.device)
+        field.parameters = field.parameters.training(state["trained"].to(self.device))
+        field.parameters.restore_rows(state["rows"])
         self._enter(field)
         self._steps_here = state["steps_here"]

@@ -117,9 +117,23 @@ def test_rows_put_back_what_they_kept(rng):
     for moment in parameters.moments:
         moment.copy_(torch.rand_like(moment))
     index = torch.tensor([3, 7, 19])
-    fresh = Parameters.starting_from(torch.zeros(20), torch.zeros(20, 8))
-    fresh.restore_rows(index, parameters.rows(index))
-    kept = [(parameters.scalar, fresh.scalar), (parameters.features, fresh.features)]
-    for original, restored in [*kept, *zip(parameters.moments, fresh.moments, strict=True)]:
+    some = parameters.training(index.int())
+    fresh = Parameters.starting_from(torch.zeros(20), torch.zeros(20, 8), index.int())
+    fresh.restore_rows(some.rows())
+    for original, restored in [(parameters.scalar, fresh.scalar), (parameters.features, fresh.features)]:
         assert torch.equal(restored[index], original[index])
         assert restored.count_nonzero() == original[index].count_nonzero()
+    for original, restored in zip(parameters.moments, fresh.moments, strict=True):
+        assert torch.equal(restored, original[index])
+
+
+def test_entries_that_go_on_training_keep_their_moments():
+    parameters = Parameters.starting_from(torch.rand(20), torch.rand(20, 8), torch.tensor([2, 5, 9, 14]).int())
+    for moment in parameters.moments:
+        moment.copy_(torch.rand_like(moment))
+    others = parameters.training(torch.tensor([1, 5, 14, 15]).int())
+    for before, after in zip(parameters.moments, others.moments, strict=True):
+        assert torch.equal(after[[1, 2]], before[[1, 3]])
+        assert not after[[0, 3]].any()
+    assert others.row_of[[1, 5, 14, 15]].tolist() == [0, 1, 2, 3]
+    assert int((others.row_of >= 0).sum()) == 4

@@ -24,8 +24,7 @@ def field_of(density: np.ndarray, features: np.ndarray, occupied: np.ndarray, de
     n = len(density)
     scalar, colours = (torch.from_numpy(a.astype(np.float32)).to(device) for a in (density, features))
     parameters = Parameters.starting_from(scalar.reshape(-1), colours.reshape(-1, 8))
-    active = torch.arange(n**3, dtype=torch.int32, device=device)
-    return VoxelField(Space.cube(), n, parameters, torch.from_numpy(occupied).to(device), active)
+    return VoxelField(Space.cube(), n, parameters, torch.from_numpy(occupied).to(device))
 
 
 def mixed_field(rng: np.random.Generator, device: str = "cpu", *, nodes: int = NODES) -> VoxelField:

@@ -40,6 +40,7 @@ def kernel_gradients(tracer: Tracer, batch, volume: Volume, grads) -> list[torch
     alpha, features = torch.zeros(parts, n, device=device), torch.zeros(parts, n, 8, device=device)
     vertices, touched = torch.zeros(parts, V, 3, device=device), torch.zeros(n, dtype=torch.uint8, device=device)
     gradients = VolumeGradients()
+    gradients.row_of = wp.array(np.arange(n, dtype=np.int32), device=device)
     gradients.alpha, gradients.features = wp.from_torch(alpha), wp.from_torch(features, dtype=vec8)
     gradients.touched, gradients.vertices = wp.from_torch(touched), wp.from_torch(vertices, dtype=wp.vec3)
     given = [tuple(torch.from_numpy(np.float32(g)).to(device) for g in pair) for pair in grads]

@@ -16,6 +16,7 @@ from core.field.frame import Frame, as_vec3, empty
 from core.images import downscaled, downscaled_size
 from core.kernels.camera_rays import camera_rays
 from core.kernels.launch import launch
+from core.training.exposure import evened
 
 # Of the pixels far from the object, this share is kept: they only say that nothing is there.
 BACKGROUND_SHARE = 0.1
@@ -48,12 +49,16 @@ class PixelPool:
 
     A pixel takes 3 bytes, or 4 where photos have an alpha channel, and 4 more where not every pixel may be drawn.
     Photos are gone through one by one, so that little is needed besides.
+
+    Attributes:
+        log_gains: [photos, 3], logarithms of the photos' exposures, which their colours are freed of; None for none.
     """
 
     def __init__(self, views: Sequence[View], frame: Frame, device: str, factor: int = 1, seed: int = 0) -> None:
         """Args: factor: the photos are area-averaged by it first."""
         cameras = [view.camera.resized(downscaled_size(view.camera.size_px, factor)) for view in views]
         self.device, self._frame = device, frame
+        self.log_gains: Tensor | None = None
         self._cameras = frame.camera_array(cameras, device)
         self._starts = np.concatenate([[0], np.cumsum([camera.size_px[0] * camera.size_px[1] for camera in cameras])])
         self._widths = np.array([camera.size_px[0] for camera in cameras])
@@ -86,7 +91,8 @@ class PixelPool:
         values = self._pixels[torch.from_numpy(index).to(self.device)].float() / 255.0
         alpha = values[:, 3] if values.shape[1] == 4 else torch.ones_like(values[:, 0])
         photo = torch.from_numpy(image).to(self.device)
-        return Batch(origins, directions, centres, values[:, :3] * alpha[:, None], alpha, photo)
+        color = values[:, :3] if self.log_gains is None else evened(values[:, :3], self.log_gains[photo])
+        return Batch(origins, directions, centres, color * alpha[:, None], alpha, photo)
 
     def _singles(self, rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(photo, column, row) [count] of pixels of the pool."""

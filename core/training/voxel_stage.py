@@ -14,6 +14,7 @@ from torch import nn
 from core.capture import Capture
 from core.field.network import shade
 from core.field.region import Region
+from core.field.space import CUBE
 from core.field.voxels import EMPTY_DENSITY, HIGHEST_DENSITY, VoxelField
 from core.presets import Settings
 from core.training.loss import color_error, pixel_loss
@@ -25,6 +26,10 @@ from core.training.stage import Stage
 # cells: 0.60 at 0.08, 0.29 at 0.3), and thin surfaces lose less when they become quads: +0.75 dB there. At 1.0 nothing
 # is learned any more (24.2 dB).
 DENSITY_RATE, FEATURE_RATE, NETWORK_RATE = 0.3, 0.03, 5e-3
+# Without an alpha channel nothing says where air is, and what turns solid too early stays in the way. On fern (504 px,
+# 128 nodes, 800 steps) the held-out views get 22.9 dB at 0.04, 22.6 at 0.08, 21.5 at 0.15 and less at 0.3; with a
+# distortion loss 10 times as strong, 4.5 dB less on the training views at 0.08.
+OPEN_DENSITY_RATE, OPEN_DISTORTION = 0.04, 0.1  # the latter: of the settings' distortion
 # Rates fall to this share, exponentially. 0.03 costs 1 dB in 2000 steps, 0.3 gains 0.2.
 FINAL_RATE = 0.2
 DENSITY_DECAY = 0.05  # empty space must cost something; falls to nothing
@@ -64,6 +69,9 @@ class VoxelStage(Stage):
     ) -> None:
         super().__init__(network, settings, settings.voxel_steps, seed, device)
         self.capture, self.region = capture, region
+        enclosed = region.space.kind == CUBE
+        self._density_rate = DENSITY_RATE if enclosed else OPEN_DENSITY_RATE
+        self._distortion = settings.distortion * (1.0 if enclosed else OPEN_DISTORTION)
         self._levels = levels_of(settings)
         self._enter(VoxelField.new(region.space, self._levels[0].nodes, region.hull, seed, device))
 
@@ -94,10 +102,10 @@ class VoxelStage(Stage):
         loss = pixel_loss(color, A, batch.color, batch.alpha, self.settings.coverage)
         falling = FINAL_RATE**self.fraction
         self.optimize_network(loss, NETWORK_RATE * falling)
-        distortion = self.settings.distortion if level is not self._levels[0] else 0.0
+        distortion = self._distortion if level is not self._levels[0] else 0.0
         grads = self.gradient(F, level.batch), self.gradient(A, level.batch)
         self.marcher.backward(batch.origins, batch.directions, *grads, distortion)
-        rates = (DENSITY_RATE * falling, FEATURE_RATE * falling)
+        rates = (self._density_rate * falling, FEATURE_RATE * falling)
         decay = DENSITY_DECAY * (1.0 - self.fraction)
         self.marcher.adam(rates, decay, (EMPTY_DENSITY, HIGHEST_DENSITY), self._steps_here)
         return color_error(color, A, batch.color, batch.alpha)

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from core.baked import BakedScene
+from core.baking.background import background_of
 from core.baking.pages import pack_pages, patches_of
 from core.baking.seen import look_from
 from core.baking.start import start_camera
@@ -64,7 +65,7 @@ def quick_bake(stage: TexelStage, capture: Capture, frame: Frame) -> BakedScene:
     return BakedScene(
         pages,
         baked_network(stage.network),
-        capture.background,
+        background_of(capture),
         capture.asset_from_object,
         user_from_object=capture.user_from_object,
     )

@@ -10,6 +10,7 @@ import pytest
 
 from core.baked import BakedScene
 from exporters.usd import schema, write_usd
+from exporters.usd.quicklook import write_quicklook
 from exporters.usd.writer import Form
 from tests.conformance.usd_validation import errors_of, resolves_everything
 
@@ -21,6 +22,11 @@ SCHEMA = Path(__file__).parents[2] / "docs" / "usd" / "polyfield"
 def test_validators_find_nothing(scene: BakedScene, tmp_path: Path, form: Form) -> None:
     assert errors_of(write_usd(scene, form), tmp_path) == []
     assert resolves_everything(tmp_path / f"scene.{form}")
+
+
+def test_validators_find_nothing_in_the_quick_look_package(scene: BakedScene, tmp_path: Path) -> None:
+    assert errors_of(write_quicklook(scene), tmp_path, suppress=False) == []
+    assert resolves_everything(tmp_path / "scene.quicklook.usdz")
 
 
 @pytest.mark.parametrize(

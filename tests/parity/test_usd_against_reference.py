@@ -6,11 +6,13 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
+from pxr import UsdGeom
 
 from core.baked import BakedScene, similarity_scale
 from core.camera import Camera
 from core.render.reference import render_forward, visibility
 from exporters.usd import write_usd
+from exporters.usd.quicklook import write_quicklook
 from exporters.usd.writer import Form
 from tests.parity.compare import FLIPPED_SHARE, INTERIOR_DB, Comparison, compare, pixels_with_edges
 from tests.parity.usd_renderer import Look, UsdRenderer
@@ -94,6 +96,17 @@ def test_fallback_shows_the_mean_colours(context: moderngl.Context, scene: Baked
         comparison = compare(actual, shown, pixels_with_edges(scene, camera))
         assert comparison.interior_psnr >= INTERIOR_DB, str(comparison)
         assert comparison.flipped_share <= FLIPPED_SHARE, str(comparison)
+
+
+def test_quick_look_asset_looks_like_the_fallback(context: moderngl.Context, scene: BakedScene, tmp_path: Path) -> None:
+    fallback = UsdRenderer(context, write_usd(scene), tmp_path, "preview")
+    phone = UsdRenderer(context, write_quicklook(scene), tmp_path, "preview", smooth=True)
+    standing = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(phone.stage.GetDefaultPrim())).T
+    for camera in scene.cameras:
+        expected = fallback.render(in_asset(camera, scene.asset_from_object))
+        actual = phone.render(in_asset(camera, standing))
+        assert -10 * np.log10(((actual - expected) ** 2).mean()) > 24  # texels have other borders
+        assert np.abs(actual[..., 3] - expected[..., 3]).mean() < 0.02
 
 
 # In the text of scene.usda: right, wrong.

@@ -1,0 +1,5 @@
+"""USD for phones."""
+
+from exporters.usd.quicklook.writer import write_quicklook
+
+__all__ = ["write_quicklook"]

@@ -1,7 +1,7 @@
 """Stage 1a: a voxel field, coarse to fine. It finds out in a minute where surfaces are.
 
 The paper's stage 1 learns opacity with 8 x 384 networks on the mesh itself, for hours. A voxel field learns the same
-scene 100 times faster, and the mesh then starts from where its surfaces are.
+scene 100 times faster, and the mesh then starts from where its surfaces are. docs/training.md says what was tried.
 """
 
 from dataclasses import dataclass

@@ -14,9 +14,9 @@ from exporters.check.page import check_page
 from exporters.check.shaders import check_shaders
 from exporters.gltf import extension, reader
 from exporters.gltf.document import Document, chunks
+from exporters.images import image_size
 from exporters.invalid import invalid, only_asset_invalid
 from exporters.limits import MAX_PAGES, check_size
-from exporters.png import png_size
 
 GENERAL = (extension.NAME, "KHR_materials_unlit")
 
@@ -152,7 +152,7 @@ def _check_sizes(document: Document, primitives: list[dict[str, Any]]) -> None:
     sizes = []
     for primitive in primitives:
         with suppress(AssetInvalid), only_asset_invalid("page"):  # each page is judged by itself later
-            sizes.append(png_size(reader.page_pngs(document, primitive)[0], "page"))
+            sizes.append(image_size(reader.page_files(document, primitive)[0], "page"))
     check_size(sizes, AssetInvalid)
 
 

@@ -36,6 +36,7 @@ def check_features(
     if len(some) == 0:
         return
     features, colors = features_u8[rows[some], columns[some]], color[rows[some], columns[some], :3] / 255.0
+    tolerance = TOLERANCE + (_step_of(color[rows, columns, :3]) - 1) / 2 / 255
     premultiplied = [half for half in (0, 1) if _is_premultiplied(features[:, 4 * half : 4 * half + 4])]
     if premultiplied:
         which = " and ".join(("features 0-3", "features 4-7")[half] for half in premultiplied)
@@ -43,29 +44,39 @@ def check_features(
             "feature", name, f"must have straight alpha, but {which} are premultiplied: no colour exceeds alpha"
         )
         return
-    outside = _outside_share(features, colors, network)
+    outside = _outside_share(features, colors, network, tolerance)
     if outside <= OUTSIDE_SHARE:
         return
     message = f"must show the fallback's colours, but {100 * outside:.0f} % of the texels cannot"
-    found.error("feature", name, f"{message}: {_explanation(features, colors, network, outside)}")
+    found.error("feature", name, f"{message}: {_explanation(features, colors, network, tolerance, outside)}")
 
 
-def _explanation(features: np.ndarray, colors: np.ndarray, network: ShaderNetwork, outside: float) -> str:
-    shares = {text: _outside_share(features[:, order], colors, network) for text, order in PERMUTATIONS.items()}
+def _explanation(
+    features: np.ndarray, colors: np.ndarray, network: ShaderNetwork, tolerance: float, outside: float
+) -> str:
+    shares = {
+        text: _outside_share(features[:, order], colors, network, tolerance) for text, order in PERMUTATIONS.items()
+    }
     best = min(shares, key=lambda text: shares[text])
     if shares[best] <= OUTSIDE_SHARE and shares[best] < outside / 2:
         return best
     return "the textures were converted or compressed, or the network is another one"
 
 
-def _outside_share(features_u8: np.ndarray, colors: np.ndarray, network: ShaderNetwork) -> float:
+def _outside_share(features_u8: np.ndarray, colors: np.ndarray, network: ShaderNetwork, tolerance: float) -> float:
     """Share of texels whose colour [n, 3] the network shows from no direction."""
     directions = _directions()
     features = np.repeat(feature_from_byte(features_u8)[:, None], len(directions), 1)
     with np.errstate(over="ignore", invalid="ignore"):  # weights may be as large as float32 goes
         shown = np.nan_to_num(network(features, np.broadcast_to(directions, (*features.shape[:2], 3))))
-    low, high = shown.min(1) - TOLERANCE, shown.max(1) + TOLERANCE
+    low, high = shown.min(1) - tolerance, shown.max(1) + tolerance
     return float(((colors < low) | (colors > high)).any(-1).mean())
+
+
+def _step_of(colors_u8: np.ndarray) -> int:
+    """What colours [n, 3] were rounded to multiples of: the least difference of two values of a channel, at least 1."""
+    values = (np.flatnonzero(np.bincount(channel, minlength=256)) for channel in colors_u8.T)
+    return min((int(np.diff(found).min()) for found in values if len(found) > 1), default=1)
 
 
 def _is_premultiplied(half: np.ndarray) -> bool:

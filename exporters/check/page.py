@@ -11,8 +11,9 @@ from exporters.check.finding import Findings
 from exporters.check.png_chunks import COLOR_CHUNKS, chunk_names
 from exporters.gltf import reader
 from exporters.gltf.document import Document
+from exporters.gltf.quantization import steps_of
+from exporters.images import decode_image
 from exporters.invalid import invalid
-from exporters.png import decode_png
 
 _NAMES = ("features 0-3", "features 4-7", "fallback colour")
 _NEAREST = 9728
@@ -31,17 +32,17 @@ def check_page(
     mesh = found.attempt("mesh", f"{name}'s mesh", reader.mesh_of, document, primitive)
     if mesh is not None:
         found.attempt("mesh", f"{name}'s mesh", _check_mesh, found, document, primitive, name, *mesh)
-    pngs = found.attempt("texture", f"{name}'s textures", reader.page_pngs, document, primitive)
-    if pngs is None:
+    files = found.attempt("texture", f"{name}'s textures", reader.page_files, document, primitive)
+    if files is None:
         return
     found.attempt("texture", f"{name}'s textures", _check_sampling, found, document, primitive, name)
-    for png, label in zip(pngs, _NAMES, strict=True):
-        managed = COLOR_CHUNKS & set(chunk_names(png))
+    for file, label in zip(files, _NAMES, strict=True):
+        managed = COLOR_CHUNKS & set(chunk_names(file))
         if managed and label != _NAMES[2]:
             found.error("texture", f"{name}, {label}", f"must not say how to convert colours ({', '.join(managed)})")
     images = [
-        found.attempt("texture", name, decode_png, png, f"{name}, {label}")
-        for png, label in zip(pngs, _NAMES, strict=True)
+        found.attempt("texture", name, decode_image, file, f"{name}, {label}")
+        for file, label in zip(files, _NAMES, strict=True)
     ]
     if any(image is None for image in images):
         return
@@ -81,7 +82,8 @@ def _check_mesh(
     if len(positions) == 0 or len(triangles) == 0:
         raise invalid(f"{name}'s mesh", "must have triangles", f"{len(positions)} vertices, {len(triangles)} triangles")
     accessor = document.item("accessors", primitive["attributes"]["POSITION"])
-    for bound, actual in (("min", positions.min(0)), ("max", positions.max(0))):
+    stored = steps_of(positions) if accessor.get("normalized") else positions
+    for bound, actual in (("min", stored.min(0)), ("max", stored.max(0))):
         if not np.array_equal(np.asarray(accessor.get(bound), np.float32), actual):
             found.error("mesh", f"{name}, POSITION", f"must state its {bound}, {actual.tolist()}, as glTF asks for")
     if int(triangles.max()) < len(positions):
@@ -109,5 +111,3 @@ def _check_holes(found: Findings, features_u8: np.ndarray, color: np.ndarray, na
     differ = int((opaque != (color[..., 3] > 0)).sum())
     if differ:
         found.error("hole", name, f"must have holes where the fallback has, but {differ} texels differ")
-    elif features_u8[~opaque].any():
-        found.warning("hole", name, "should be zero in every channel of a hole: it compresses best")

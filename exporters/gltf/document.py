@@ -8,15 +8,19 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from exporters.gltf.meshopt_codec import MESHOPT, decoded
 from exporters.invalid import invalid
 
+WEBP = "EXT_texture_webp"
 _MAGIC = 0x46546C67  # "glTF"
 _JSON = 0x4E4F534A
 _BIN = 0x004E4942
 _HEADER = struct.Struct("<III")
 _CHUNK = struct.Struct("<II")
+SHORT = 5122
 _COMPONENTS: dict[int, np.dtype[Any]] = {
     5121: np.dtype("u1"),
+    SHORT: np.dtype("<i2"),
     5123: np.dtype("<u2"),
     5125: np.dtype("<u4"),
     5126: np.dtype("<f4"),
@@ -73,32 +77,62 @@ class Document:
         return found
 
     def view_bytes(self, index: Any) -> memoryview:
-        """The bytes of a buffer view."""
+        """The bytes of a buffer view that is neither strided nor compressed."""
         view = self.item("bufferViews", index)
-        subject = f"bufferViews[{index}]"
-        if view.get("buffer") != 0 or "byteStride" in view:
-            raise invalid(subject, "must lie unstrided in buffer 0", str(view)[:80])
-        return _slice(memoryview(self.buffer()), view.get("byteOffset", 0), view.get("byteLength"), subject)
+        if "byteStride" in view or MESHOPT in view.get("extensions", {}):
+            raise invalid(f"bufferViews[{index}]", "must lie unstrided in buffer 0", str(view)[:80])
+        return self._stored(view, f"bufferViews[{index}]")
 
     def accessor(self, index: Any, width: str, components: tuple[int, ...]) -> np.ndarray:
-        """[count, n] (or [count] for SCALAR) of an accessor whose type and component type must be as given."""
+        """[count, n] (or [count] for SCALAR) of an accessor whose type and component type must be as given.
+
+        Shorts must be normalised and come as they are stored; nothing else may be normalised.
+        """
         accessor = self.item("accessors", index)
         subject = f"accessors[{index}]"
         component: Any = accessor.get("componentType")
         count: Any = accessor.get("count")
-        if accessor.get("type") != width or component not in components or "sparse" in accessor:
+        plain = "sparse" not in accessor and accessor.get("normalized", False) is (component == SHORT)
+        if accessor.get("type") != width or component not in components or not plain:
             raise invalid(subject, f"must be a plain {width} of component type {components}", str(accessor)[:80])
         if not _is_length(count):
             raise invalid(subject, "must have a count", str(count)[:20])
         dtype: np.dtype[Any] = np.dtype(_COMPONENTS[component])
-        view = self.view_bytes(accessor.get("bufferView"))
-        length = count * _WIDTHS[width] * dtype.itemsize
-        values = np.frombuffer(bytes(_slice(view, accessor.get("byteOffset", 0), length, subject)), dtype)
+        content, stride = self._rows(accessor.get("bufferView"))
+        length = _WIDTHS[width] * dtype.itemsize
+        if stride is None or stride == length:
+            content = _slice(content, accessor.get("byteOffset", 0), count * length, subject)
+            values = np.frombuffer(bytes(content), dtype)
+        else:
+            content = _slice(content, accessor.get("byteOffset", 0), count * stride, subject)
+            rows = np.frombuffer(bytes(content), np.uint8).reshape(count, stride)
+            values = np.ascontiguousarray(rows[:, :length]).view(dtype).ravel()
         return values if width == "SCALAR" else values.reshape(count, _WIDTHS[width])
 
+    def _rows(self, index: Any) -> tuple[memoryview, int | None]:
+        """(content, bytes from row to row or None: tightly packed) of an accessor's buffer view."""
+        view, subject = self.item("bufferViews", index), f"bufferViews[{index}]"
+        coding = view.get("extensions", {}).get(MESHOPT)
+        if coding is not None:
+            content, size = decoded(coding, self._stored(coding, subject), subject)
+            if len(content) != view.get("byteLength") or view.get("byteStride", size) != size:
+                raise invalid(subject, f"must be the {len(content)} bytes that are stored", str(view)[:80])
+            return content, size
+        stride = view.get("byteStride")
+        if stride is not None and not (_is_length(stride) and 4 <= stride <= 252):
+            raise invalid(subject, "must have a stride of 4 to 252", str(stride)[:20])
+        return self._stored(view, subject), stride
+
+    def _stored(self, place: dict[str, Any], subject: str) -> memoryview:
+        """What lies in buffer 0, the only one with content, where `place` says."""
+        if place.get("buffer") != 0:
+            raise invalid(subject, "must lie in buffer 0", str(place)[:80])
+        return _slice(memoryview(self.buffer()), place.get("byteOffset", 0), place.get("byteLength"), subject)
+
     def image_bytes(self, texture: Any) -> bytes:
-        """The image file behind a texture."""
-        image = self.item("images", self.item("textures", texture).get("source"))
+        """The image file behind a texture; its WebP (EXT_texture_webp) where it has one."""
+        content = self.item("textures", texture)
+        image = self.item("images", content.get("extensions", {}).get(WEBP, content).get("source"))
         return self._file(image["uri"]) if "uri" in image else bytes(self.view_bytes(image.get("bufferView")))
 
     def buffer(self) -> bytes:

@@ -11,20 +11,24 @@ from core.conventions import is_opaque
 from core.errors import AssetInvalid
 from exporters.glsl import ShaderSources
 from exporters.gltf import extension
-from exporters.gltf.document import Document
+from exporters.gltf.document import SHORT, Document
 from exporters.gltf.placement import node_matrix
+from exporters.gltf.quantization import positions_of
+from exporters.images import decode_images, image_size
 from exporters.invalid import invalid, only_asset_invalid
 from exporters.limits import check_size
 from exporters.numbers import matrix_from_column_major, numbers
-from exporters.png import decode_pngs, png_size
 
 _FLOAT = (5126,)
+_POSITION = (SHORT, 5126)
 _INDEX = (5121, 5123, 5125)
 _WHITE = [1.0, 1.0, 1.0]
 
 
 def read_glb(data: bytes) -> BakedScene:
     """The scene in a .glb written by `write_glb`, bit for bit (`asset_from_object`: as `placement.trs` says).
+
+    Of `write_web_glb` and `write_lq_glb`, the scene as they changed it; colours under holes are undefined there.
 
     Raises:
         AssetInvalid: damaged, or not a file of this kind. Nothing else, whatever the bytes.
@@ -109,9 +113,9 @@ def cameras_of(document: Document, root: dict[str, Any]) -> tuple[Camera, ...]:
 
 
 def _pages(document: Document) -> tuple[Page, ...]:
-    found = [(primitive, page_pngs(document, primitive)) for primitive in neural_primitives(document)]
-    check_size((png_size(pngs[0], "feature texture") for _, pngs in found), AssetInvalid)
-    return tuple(_page(document, primitive, pngs) for primitive, pngs in found)
+    found = [(primitive, page_files(document, primitive)) for primitive in neural_primitives(document)]
+    check_size((image_size(files[0], "feature texture") for _, files in found), AssetInvalid)
+    return tuple(_page(document, primitive, files) for primitive, files in found)
 
 
 def neural_primitives(document: Document) -> list[dict[str, Any]]:
@@ -120,23 +124,23 @@ def neural_primitives(document: Document) -> list[dict[str, Any]]:
     return [primitive for primitive in primitives if extension.NAME in primitive.get("extensions", {})]
 
 
-def page_pngs(document: Document, primitive: dict[str, Any]) -> list[bytes]:
-    """The PNG files of features 0-3, features 4-7 and the fallback colour; equal sizes, nothing decoded yet."""
+def page_files(document: Document, primitive: dict[str, Any]) -> list[bytes]:
+    """The image files of features 0-3, features 4-7 and the fallback colour; equal sizes, nothing decoded yet."""
     neural = primitive["extensions"][extension.NAME]
     if neural["coding"] != extension.CODING or neural["network"] != 0:
         raise invalid("neural primitive", f"must have coding {extension.CODING} and network 0", str(neural)[:80])
     features0, features1 = (texture["index"] for texture in neural["featureTextures"])
     material = document.item("materials", primitive.get("material"))
     color = material["pbrMetallicRoughness"]["baseColorTexture"]["index"]
-    pngs = [document.image_bytes(index) for index in (features0, features1, color)]
-    sizes = [png_size(png, "page's texture") for png in pngs]
+    files = [document.image_bytes(index) for index in (features0, features1, color)]
+    sizes = [image_size(file, "page's texture") for file in files]
     if len(set(sizes)) != 1:
         raise invalid("page's textures", "must have one size", str(sizes))
-    return pngs
+    return files
 
 
-def _page(document: Document, primitive: dict[str, Any], pngs: list[bytes]) -> Page:
-    features0, features1, color = decode_pngs(pngs, "page's texture")
+def _page(document: Document, primitive: dict[str, Any], files: list[bytes]) -> Page:
+    features0, features1, color = decode_images(files, "page's texture")
     features_u8 = np.concatenate([features0, features1], -1)
     if not np.array_equal(color[..., 3] > 0, is_opaque(features_u8)):
         raise invalid("page's textures", "must agree on where holes are", "a fallback with other holes")
@@ -149,8 +153,9 @@ def mesh_of(document: Document, primitive: dict[str, Any]) -> tuple[np.ndarray, 
         raise invalid("primitive", "must be of triangles", f"mode {str(primitive['mode'])[:20]}")
     attributes = primitive["attributes"]
     indices = document.accessor(primitive["indices"], "SCALAR", _INDEX)
+    positions = document.accessor(attributes["POSITION"], "VEC3", _POSITION)
     return (
-        document.accessor(attributes["POSITION"], "VEC3", _FLOAT).astype(np.float32),
+        positions_of(positions) if positions.dtype.kind == "i" else positions.astype(np.float32),
         document.accessor(attributes["TEXCOORD_0"], "VEC2", _FLOAT).astype(np.float32),
         indices.astype(np.uint32).reshape(-1, 3),
     )

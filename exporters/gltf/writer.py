@@ -1,6 +1,5 @@
-"""A baked scene as one .glb, or as a .gltf with its files."""
+"""A baked scene as one .glb, plain or compressed, or as a .gltf with its files."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,27 +8,34 @@ import pygltflib as gltf
 from core.baked import BakedScene, Page, similarity_scale
 from core.conventions import is_opaque
 from core.errors import SceneInvalid
+from exporters.compaction import PHONE, WEB, compacted
 from exporters.gltf import extension
 from exporters.gltf.blob import Blob, glb_bytes
 from exporters.gltf.cameras import camera_json
+from exporters.gltf.compressed import CompressedStorage
 from exporters.gltf.placement import nearest_rotation, trs
+from exporters.gltf.provenance import Provenance, add_provenance
+from exporters.gltf.quantization import quantised
+from exporters.gltf.storage import NamedImage, PlainStorage, Storage
 from exporters.limits import check_size
 from exporters.numbers import column_major
-from exporters.png import encode_pngs
 
 FILE_NAME = "scene.glb"
+WEB_NAME = "scene.web.glb"
+LQ_NAME = "scene.lq.glb"
 GLTF_NAME = "scene.gltf"
 BUFFER_NAME = "scene.bin"
 IMAGES_PER_PAGE = 3  # features 0-3, features 4-7, fallback colour
 ALPHA_CUTOFF = 0.5
-ImageStore = Callable[[str, bytes], gltf.Image]  # takes a PNG by its name; the glTF image that refers to it
-_PRIMITIVE_RESTART_U16 = 65535  # an index that glTF forbids
 
 
-def write_glb(scene: BakedScene) -> dict[str, bytes]:
+def write_glb(scene: BakedScene, provenance: Provenance | None = None) -> dict[str, bytes]:
     """`{"scene.glb": ...}`: the whole scene; `read_glb` returns it bit for bit (`asset_from_object`: as `trs` says).
 
     Viewers that do not know the extension show the pages' mean colours, unlit.
+
+    Args:
+        provenance: what is known about where the asset comes from; kept as KHR_xmp_json_ld.
 
     Raises:
         SceneInvalid: the pages exceed what a reader accepts.
@@ -39,12 +45,10 @@ def write_glb(scene: BakedScene) -> dict[str, bytes]:
     def within(name: str, png: bytes) -> gltf.Image:
         return gltf.Image(name=name, mimeType="image/png", bufferView=blob.append(png))
 
-    document = _document(scene, blob, within)
-    text = document.gltf_to_json(separators=(",", ":"), indent=None).encode()
-    return {FILE_NAME: glb_bytes(text, blob)}
+    return {FILE_NAME: _glb(scene, PlainStorage(blob, within), provenance)}
 
 
-def write_gltf(scene: BakedScene) -> dict[str, bytes]:
+def write_gltf(scene: BakedScene, provenance: Provenance | None = None) -> dict[str, bytes]:
     """`scene.gltf`, `scene.bin` and a PNG per texture: what `write_glb` writes, for tools that want to see the parts.
 
     `read_gltf` returns the scene as `read_glb` does.
@@ -59,21 +63,50 @@ def write_gltf(scene: BakedScene) -> dict[str, bytes]:
         files[f"{name}.png"] = png
         return gltf.Image(name=name, mimeType="image/png", uri=f"{name}.png")
 
-    document = _document(scene, blob, beside)
+    document = _document(scene, PlainStorage(blob, beside), provenance)
     document.buffers[0].uri = BUFFER_NAME
     return {GLTF_NAME: document.gltf_to_json().encode(), BUFFER_NAME: b"".join(blob.parts), **files}
 
 
-def _document(scene: BakedScene, blob: Blob, image: ImageStore) -> gltf.GLTF2:
-    """The whole document; what is binary is in `blob`, or where `image` puts it."""
+def write_web_glb(scene: BakedScene, provenance: Provenance | None = None) -> dict[str, bytes]:
+    """`{"scene.web.glb": ...}`: the scene in the fewest bytes that look the same, for browsers.
+
+    The scene is `compacted` (WEB); images are lossless WebP, meshes compressed (EXT_meshopt_compression) with
+    quantised positions. Loaders have to know these extensions. `read_glb` returns the compacted scene, in an object
+    frame of its own (`quantised`).
+
+    Raises:
+        SceneInvalid: the pages exceed what a reader accepts.
+    """
+    return {WEB_NAME: _compressed_glb(compacted(scene, WEB), provenance)}
+
+
+def write_lq_glb(scene: BakedScene, provenance: Provenance | None = None) -> dict[str, bytes]:
+    """`{"scene.lq.glb": ...}`: as `write_web_glb`, with half the texels along each side of a quad, for phones."""
+    return {LQ_NAME: _compressed_glb(compacted(scene, PHONE), provenance)}
+
+
+def _compressed_glb(scene: BakedScene, provenance: Provenance | None) -> bytes:
+    rounded = quantised(scene)
+    return _glb(rounded or scene, CompressedStorage(quantised=rounded is not None), provenance)
+
+
+def _glb(scene: BakedScene, storage: Storage, provenance: Provenance | None) -> bytes:
+    document = _document(scene, storage, provenance)
+    return glb_bytes(document.gltf_to_json(separators=(",", ":"), indent=None).encode(), storage.blob)
+
+
+def _document(scene: BakedScene, storage: Storage, provenance: Provenance | None) -> gltf.GLTF2:
+    """The whole document; what is binary is where `storage` puts it."""
     check_size([page.features_u8.shape[:2] for page in scene.pages], SceneInvalid)
     document = _empty_document()
-    _add_pages(document, blob, scene, image)
+    _add_pages(document, scene, storage)
     views = _add_cameras(document, scene)
     _add_object_node(document, scene)
     document.extensions = {extension.NAME: _root(scene, views)}
-    document.bufferViews = blob.views
-    document.buffers = [gltf.Buffer(byteLength=blob.length)]
+    storage.finish(document)
+    if provenance is not None:
+        add_provenance(document, provenance)
     return document
 
 
@@ -92,25 +125,28 @@ def _empty_document() -> gltf.GLTF2:
     )
 
 
-def _add_pages(document: gltf.GLTF2, blob: Blob, scene: BakedScene, image: ImageStore) -> None:
-    pngs = encode_pngs([pixels for page in scene.pages for pixels in _page_images(page)])
+def _add_pages(document: gltf.GLTF2, scene: BakedScene, storage: Storage) -> None:
+    storage.add_textures(
+        document, [image for number, page in enumerate(scene.pages) for image in _page_images(page, f"page{number}")]
+    )
     for number, page in enumerate(scene.pages):
         first = IMAGES_PER_PAGE * number
-        for png, label in zip(pngs[first : first + 3], ("features0", "features1", "color"), strict=True):
-            name = f"page{number}.{label}"
-            document.images.append(image(name, png))
-            document.textures.append(gltf.Texture(name=name, sampler=0, source=len(document.images) - 1))
         document.materials.append(_fallback_material(number, first + 2))
-        primitive = _primitive(document, blob, page, number)
+        primitive = storage.add_mesh(document, page)
+        primitive.material = number
         primitive.extensions = {extension.NAME: extension.primitive_json((first, first + 1))}
         document.meshes.append(gltf.Mesh(name=f"page{number}", primitives=[primitive]))
         document.nodes.append(gltf.Node(name=f"page{number}", mesh=number))
 
 
-def _page_images(page: Page) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _page_images(page: Page, name: str) -> tuple[NamedImage, NamedImage, NamedImage]:
     """The three RGBA images of a page; the fallback's alpha is 0 in holes, 255 elsewhere."""
     alpha = np.where(is_opaque(page.features_u8), np.uint8(255), np.uint8(0))[..., None]
-    return page.features_u8[..., :4], page.features_u8[..., 4:], np.concatenate([page.colors_u8, alpha], -1)
+    return (
+        NamedImage(f"{name}.features0", page.features_u8[..., :4], exact=True),
+        NamedImage(f"{name}.features1", page.features_u8[..., 4:], exact=True),
+        NamedImage(f"{name}.color", np.concatenate([page.colors_u8, alpha], -1), exact=False),
+    )
 
 
 def _fallback_material(number: int, color_texture: int) -> gltf.Material:
@@ -125,30 +161,6 @@ def _fallback_material(number: int, color_texture: int) -> gltf.Material:
         ),
         extensions={"KHR_materials_unlit": {}},
     )
-
-
-def _primitive(document: gltf.GLTF2, blob: Blob, page: Page, material: int) -> gltf.Primitive:
-    narrow = len(page.positions) <= _PRIMITIVE_RESTART_U16
-    index_type, index_dtype = (gltf.UNSIGNED_SHORT, "<u2") if narrow else (gltf.UNSIGNED_INT, "<u4")
-    positions = np.asarray(page.positions, "<f4")
-    texcoords = np.asarray(page.texcoords, "<f4")
-    indices = page.triangles.ravel().astype(index_dtype)
-    corners: dict[str, Any] = {
-        "min": [float(n) for n in positions.min(0)],
-        "max": [float(n) for n in positions.max(0)],
-    }
-    first = len(document.accessors)
-    document.accessors += [
-        _accessor(blob.append(positions, gltf.ARRAY_BUFFER), gltf.FLOAT, gltf.VEC3, len(positions), **corners),
-        _accessor(blob.append(texcoords, gltf.ARRAY_BUFFER), gltf.FLOAT, gltf.VEC2, len(texcoords)),
-        _accessor(blob.append(indices, gltf.ELEMENT_ARRAY_BUFFER), index_type, gltf.SCALAR, len(indices)),
-    ]
-    attributes = gltf.Attributes(POSITION=first, TEXCOORD_0=first + 1)
-    return gltf.Primitive(attributes=attributes, indices=first + 2, material=material)
-
-
-def _accessor(view: int, component_type: int, kind: str, count: int, **corners: Any) -> gltf.Accessor:
-    return gltf.Accessor(bufferView=view, componentType=component_type, type=kind, count=count, **corners)
 
 
 def _root(scene: BakedScene, views: list[dict[str, Any]]) -> dict[str, Any]:

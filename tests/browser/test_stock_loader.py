@@ -1,24 +1,30 @@
 """A viewer that does not know the extension shows the fallback."""
 
 import io
+from collections.abc import Callable
 
 import numpy as np
+import pytest
 from PIL import Image
 from playwright.sync_api import Page
 
 from core.baked import BakedScene
 from core.camera import Camera
 from core.render.reference import visibility
-from exporters.gltf import write_glb
+from exporters.gltf import read_glb, write_glb, write_lq_glb, write_web_glb
 from tests.browser.site import Site
 from tests.parity.compare import pixels_with_edges
 
 # A colour goes to linear light and back on its way: half a step of rounding each.
 TOLERANCE = 2
+Writer = Callable[[BakedScene], dict[str, bytes]]
 
 
-def test_stock_loader_shows_the_baked_mean_colours(page: Page, site: Site, scene: BakedScene) -> None:
-    site.files["/scene.glb"] = write_glb(scene)["scene.glb"]
+@pytest.mark.parametrize("write", [write_glb, write_web_glb, write_lq_glb])
+def test_stock_loader_shows_the_baked_mean_colours(page: Page, site: Site, scene: BakedScene, write: Writer) -> None:
+    (glb,) = write(scene).values()
+    site.files["/scene.glb"] = glb
+    scene = read_glb(glb)
     camera = scene.cameras[0]
     width, height = camera.size_px
     page.goto(f"{site.url}/pages/stock.html?src=/scene.glb&width={width}&height={height}")

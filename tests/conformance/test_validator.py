@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 from core.baked import BakedScene
-from exporters.gltf import write_glb, write_gltf
+from exporters.gltf import Provenance, read_glb, write_glb, write_gltf, write_lq_glb, write_web_glb
 from tests.scenes import random_scene
 
 SCRIPT = Path(__file__).with_name("validate_gltf.mjs")
@@ -56,6 +57,16 @@ def test_validator_finds_nothing_in_the_gltf_with_files(scene: BakedScene, tmp_p
     report = validated_file(tmp_path / "scene.gltf")
     assert_clean(report)
     assert len(report["info"]["resources"]) == 1 + 3 * len(scene.pages)
+
+
+@pytest.mark.parametrize("write", [write_glb, write_web_glb, write_lq_glb])
+def test_validator_finds_nothing_in_any_variant_with_provenance(
+    scene: BakedScene, write: Callable[..., dict[str, bytes]], tmp_path: Path
+) -> None:
+    (glb,) = write(scene, Provenance(title="a title", creator="someone", settings={"preset": "draft"})).values()
+    report = validated(glb, tmp_path)
+    assert_clean(report)
+    assert report["info"]["totalTriangleCount"] == read_glb(glb).triangle_count
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.5, 1e-6, 1e6])

@@ -45,11 +45,15 @@ class Comparison:
         return f"interior {self.interior_psnr:.2f} dB, flipped {100 * self.flipped_share:.3f} %"
 
 
-def compare(actual: np.ndarray, reference: np.ndarray, edges: np.ndarray) -> Comparison:
-    """Two images [h, w, 4] (premultiplied, in [0, 1]) of which the reference has edges at `edges` ([h, w] bool)."""
+def compare(actual: np.ndarray, reference: np.ndarray, edges: np.ndarray, *, visible: float = VISIBLE) -> Comparison:
+    """Two images [h, w, 4] (premultiplied, in [0, 1]) of which the reference has edges at `edges` ([h, w] bool).
+
+    Args:
+        visible: from which difference on a pixel on an edge counts as flipped; above the noise of what is lossy.
+    """
     difference = np.abs(actual - reference).max(-1)
     coverage_differs = np.abs(actual[..., 3] - reference[..., 3]) > COVERAGE_STEP / 2
-    flipped = edges & (coverage_differs | (difference > VISIBLE))
+    flipped = edges & (coverage_differs | (difference > visible))
     shown = (actual[..., 3] > 0) | (reference[..., 3] > 0)
     squares = ((actual - reference) ** 2)[shown & ~flipped]
     psnr = -10 * np.log10(max(squares.mean(), SMALLEST_ERROR)) if squares.size else 0.0

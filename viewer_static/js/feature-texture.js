@@ -3,14 +3,14 @@
 import { ClampToEdgeWrapping, NearestFilter, NoColorSpace, Texture, UnsignedByteType } from "three";
 
 /**
- * Decodes a PNG without premultiplication and colour management: a browser's defaults would change features wherever
+ * Decodes a PNG or lossless WebP without premultiplication and colour management: a browser's defaults would change features wherever
  * feature 3 or 7, which are stored as alpha, is below 1.
  *
- * @param {Blob} png
+ * @param {Blob} file
  * @returns {Promise<Texture>} RGBA8, row 0 at the image's top, nearest, one level
  */
-export async function readFeatureTexture(png) {
-  const bitmap = await createImageBitmap(png, { premultiplyAlpha: "none", colorSpaceConversion: "none" });
+export async function readFeatureTexture(file) {
+  const bitmap = await createImageBitmap(file, { premultiplyAlpha: "none", colorSpaceConversion: "none" });
   const texture = new Texture(bitmap);
   texture.colorSpace = NoColorSpace;
   texture.type = UnsignedByteType;

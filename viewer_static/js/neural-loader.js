@@ -1,12 +1,14 @@
 // GLTFLoader plug-in for POLYFIELD_materials_neural. The extension's README is the specification.
 
 import { MeshBasicMaterial } from "three";
+import { MeshoptDecoder } from "three/addons/libs/meshopt_decoder.module.js";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { readFeatureTexture } from "./feature-texture.js";
 import { NeuralMaterial } from "./neural-material.js";
 
 export const EXTENSION = "POLYFIELD_materials_neural";
 const DIALECT = "essl300";
+const WEBP = "EXT_texture_webp";
 
 /**
  * Loads a .glb.
@@ -16,7 +18,7 @@ const DIALECT = "essl300";
  *   `{parts, shaders, background, views, startView}`, see NeuralExtension.
  */
 export async function loadGlb(bytes) {
-  const loader = new GLTFLoader();
+  const loader = new GLTFLoader().setMeshoptDecoder(MeshoptDecoder);
   loader.register((parser) => new NeuralExtension(parser));
   return loader.parseAsync(bytes, "");
 }
@@ -85,7 +87,8 @@ class NeuralExtension {
 
   async #readTexture(index) {
     const { json } = this.#parser;
-    const image = json.images[json.textures[index].source];
+    const texture = json.textures[index];
+    const image = json.images[texture.extensions?.[WEBP]?.source ?? texture.source];
     const bytes = await this.#parser.getDependency("bufferView", image.bufferView);
     return readFeatureTexture(new Blob([bytes], { type: image.mimeType }));
   }

@@ -1,0 +1,226 @@
+"""A scene in fewer bytes: the steps in turn."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from core.baked import BakedScene, Page
+from core.conventions import FEATURE_CHANNELS, is_opaque
+from exporters.compaction.filling import filled
+from exporters.compaction.packing import packed
+from exporters.compaction.quads import CHANNELS, Patches, Quads, joined, quads_of
+from exporters.compaction.recoding import Recoding, recoding_of, widened
+from exporters.compaction.resolution import SizeOptions, Trade, shrunk, size_options
+from exporters.compaction.sharing import with_constant_axes_collapsed, with_equal_patches_shared, without_empty
+from exporters.compaction.surface import surface_points
+
+T = TypeVar("T")
+TEXELS_AT_ONCE = 1 << 18  # 10 MB of moments
+SAMPLE_POINTS = 40_000
+SAMPLE_QUADS = 8_000
+SEARCH_STEPS = 14
+FINEST_STEP = 1e-4
+LEAST_BITS = 0.2  # of a channel
+BITS_OF_HOLES = 0.5
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How much may change.
+
+    Attributes:
+        color_db: PSNR of the surface's colours after against before, seen so close that every texel shows; at a
+            distance texels are averaged and it is higher.
+        fallback_db: the same of the fallback's colours.
+        most: largest side of a patch as a share of its own; below 1, what is lost by that alone is not counted.
+        hole_cost: squared error (sum over RGB) of a hole that is filled or made; infinite: none is.
+    """
+
+    color_db: float
+    fallback_db: float
+    most: float = 1.0
+    hole_cost: float = np.inf
+
+
+# On screen 45 dB at least, and more where a pixel averages texels; far below what a photo's own noise hides.
+WEB = Quality(color_db=44.0, fallback_db=36.0)
+# Half the texels a side. Silhouettes may move by parts of a texel.
+PHONE = Quality(color_db=36.0, fallback_db=33.0, most=0.5, hole_cost=0.5)
+
+
+def repacked(scene: BakedScene) -> BakedScene:
+    """The same scene, to the bit, on as few and small pages as will do.
+
+    Every lookup on every triangle finds the same texel: quads that are all hole go, axes along which nothing changes
+    take one texel, equal patches are shared, and patches of all sizes are packed tightly. A page that is not made of
+    quads with patches (`quads_of`) stays as it is.
+    """
+    parts, others = _parts(scene)
+    return replace(scene, pages=(*_lossless(joined(parts)), *others)) if parts else scene
+
+
+def compacted(scene: BakedScene, quality: Quality = WEB) -> BakedScene:
+    """The scene in fewer bytes, its colours within `quality` of what they were.
+
+    Features are recoded and rounded (recoding.py), patches take the resolution that they need (resolution.py), and what
+    `repacked` does is done. Features under holes are no longer zero, but for the first.
+    """
+    seen = surface_points(scene, SAMPLE_POINTS)
+    if len(seen.features_u8) == 0:
+        return repacked(scene)
+    recoding = recoding_of(scene.network, seen)
+    for page in scene.pages:
+        for rows in np.array_split(page.features_u8, max(1, page.features_u8.size // 8 // TEXELS_AT_ONCE)):
+            recoding = widened(recoding, rows[is_opaque(rows)])
+    parts, others = _parts(scene)
+    pages: list[Page] = []
+    if parts:
+        quads = joined(parts)
+        recoding, trade = _settled(quads, recoding, quality)
+        pages += _lossless(_reduced(quads, recoding, trade, quality))
+    else:
+        recoding = _coarsest(recoding, quality)
+    pages += [_recoded(page, recoding, quality) for page in others]
+    return replace(scene, pages=tuple(pages), network=recoding.network(scene.network))
+
+
+def _parts(scene: BakedScene) -> tuple[list[Quads], list[Page]]:
+    """The pages that are made of quads, taken apart, and the others."""
+    found = [(page, quads_of(page)) for page in scene.pages]
+    return [quads for _, quads in found if quads is not None], [page for page, quads in found if quads is None]
+
+
+def _lossless(quads: Quads) -> tuple[Page, ...]:
+    quads = without_empty(quads)
+    return packed(with_equal_patches_shared(replace(quads, patches=with_constant_axes_collapsed(quads.patches))))
+
+
+def _budget(quality: Quality) -> float:
+    """Squared error per point of the surface, summed over RGB."""
+    return float(3 * 10 ** (-quality.color_db / 10))
+
+
+def _coarsest(recoding: Recoding, quality: Quality) -> Recoding:
+    """The coarsest rounding within the budget, where resolution stays as it is."""
+    return _search(lambda step: (found := recoding.with_step(step), found.squared_error()), _budget(quality))
+
+
+def _settled(quads: Quads, recoding: Recoding, quality: Quality) -> tuple[Recoding, Trade]:
+    """Rounding and resolution that share the budget at the least bytes, found on some of the quads."""
+    sample = _Sample(quads, recoding, quality)
+
+    def tried(step: float) -> tuple[tuple[Recoding, Trade], float]:
+        coded = recoding.with_step(step)
+        trade = sample.trade(coded)
+        return (coded, trade), coded.squared_error() + sample.error(trade)
+
+    return _search(tried, _budget(quality))
+
+
+def _search(tried: Callable[[float], tuple[T, float]], budget: float) -> T:
+    """What `tried(step) -> (result, error)` gives for the largest step whose error is within the budget."""
+    low, high = FINEST_STEP, 1.0
+    best = tried(low)[0]
+    for _ in range(SEARCH_STEPS):
+        step = float(np.sqrt(low * high))
+        result, error = tried(step)
+        if error <= budget:
+            low, best = step, result
+        else:
+            high = step
+    return best
+
+
+class _Sample:
+    """Some of the quads, to find out on."""
+
+    def __init__(self, quads: Quads, recoding: Recoding, quality: Quality) -> None:
+        some = np.random.default_rng(0).permutation(len(quads))[:SAMPLE_QUADS]
+        weight, owner = _patch_weights(quads), np.zeros(len(quads.patches.sizes), bool)
+        owner[quads.patch[some]] = True
+        self._options: list[tuple[SizeOptions, np.ndarray]] = []
+        squares, pairs, texels, covered = np.zeros(FEATURE_CHANNELS), 0, 0, 0.0
+        for numbers, content in quads.patches.by_size(TEXELS_AT_ONCE, np.flatnonzero(owner)):
+            features = content[..., :FEATURE_CHANNELS]
+            y, opaque = recoding.coordinates(features), is_opaque(features)
+            self._options.append((size_options(y, opaque, quality.most, quality.hole_cost), weight[numbers]))
+            both = opaque[:, :, 1:] & opaque[:, :, :-1]
+            squares += ((y[:, :, 1:] - y[:, :, :-1])[both] ** 2).sum(0)
+            pairs, texels = pairs + int(both.sum()), texels + opaque.size
+            covered += float((opaque.mean((1, 2)) * weight[numbers]).sum())
+        self._difference = np.sqrt(squares / max(pairs, 1))
+        self._texels = texels / int(owner.sum())
+        self._covered = max(covered, 1e-9)
+
+    def error(self, trade: Trade) -> float:
+        """Squared error of colour per point of the surface, beyond that of the largest patches allowed."""
+        found = ((options.best(weight, trade)[1], weight) for options, weight in self._options)
+        total = sum(float((np.maximum(error, 0) * weight).sum()) for error, weight in found)
+        return total / self._covered
+
+    def trade(self, recoding: Recoding) -> Trade:
+        """A bit is worth what it saves in rounding: error falls by 2 ln 2 / channels of itself per bit and texel.
+
+        Bits are the entropy of differences between neighbours, taken for Laplacian: log2(deviation / step) + 1.94.
+        """
+        active = recoding.step > 0
+        slope = 2 * np.log(2) / max(int(active.sum()), 1) * recoding.squared_error() / self._texels
+        bits = np.log2(np.maximum(self._difference[active], 1e-9) / recoding.step[active]) + 1.94
+        return Trade(float(slope), float(np.maximum(bits, LEAST_BITS).sum() + BITS_OF_HOLES))
+
+
+def _patch_weights(quads: Quads) -> np.ndarray:
+    """[N] each patch's share of the surface, mean 1; the largest of the quads that show it."""
+    weight, areas = np.zeros(len(quads.patches.sizes)), quads.world_areas()
+    np.maximum.at(weight, quads.patch, areas)
+    return weight / areas.mean() if areas.mean() > 0 else np.ones(len(weight))
+
+
+def _reduced(quads: Quads, recoding: Recoding, trade: Trade, quality: Quality) -> Quads:
+    """Patches at their chosen resolution, in bytes of the recoding; quads that are not worth theirs are left out."""
+    weight = _patch_weights(quads)
+    numbers, sizes, contents = [], [], []
+    for some, texels in quads.patches.by_size(TEXELS_AT_ONCE):
+        features = texels[..., :FEATURE_CHANNELS]
+        y, opaque = recoding.coordinates(features), is_opaque(features)
+        best, _ = size_options(y, opaque, quality.most, quality.hole_cost).best(weight[some], trade)
+        values = np.concatenate([y, texels[..., FEATURE_CHANNELS:].astype(np.float32)], -1)
+        for height, width in np.unique(best[best[:, 0] > 0], axis=0):
+            here = (best == (height, width)).all(1)
+            part = values[here], opaque[here]
+            if (height, width) != texels.shape[1:3]:
+                part = shrunk(*part, (height, width))
+            numbers.append(some[here])
+            sizes.append(best[here])
+            contents.append(_bytes(*part, recoding, quality).reshape(-1, CHANNELS))
+    new = np.full(len(quads.patches.sizes), -1)
+    order = np.concatenate(numbers)
+    new[order] = np.arange(len(order))
+    left = quads.subset(new[quads.patch] >= 0)
+    patches = Patches(np.concatenate(sizes), np.concatenate(contents))
+    return Quads(left.corners, left.ends, left.triangles, new[left.patch], patches).in_order_of_patches()
+
+
+def _bytes(values: np.ndarray, opaque: np.ndarray, recoding: Recoding, quality: Quality) -> np.ndarray:
+    """uint8 [n, h, w, 11] of coordinates and colours [n, h, w, 11]; only channel 0 says where holes are."""
+    features = recoding.bytes_of(values[..., :FEATURE_CHANNELS])
+    colors = rounded_colors(values[..., FEATURE_CHANNELS:], quality.fallback_db)
+    texels = filled(np.concatenate([features, colors], -1), opaque)
+    texels[..., 0] = np.where(opaque, features[..., 0], 0)
+    return texels
+
+
+def rounded_colors(colors: np.ndarray, decibels: float) -> np.ndarray:
+    """uint8, rounded to multiples of the step that gives this PSNR."""
+    step = max(1, int(np.sqrt(12 * 10 ** (-decibels / 10)) * 255))
+    rounded: np.ndarray = np.clip(np.rint(colors / step) * step, 0, 255 // step * step).astype(np.uint8)
+    return rounded
+
+
+def _recoded(page: Page, recoding: Recoding, quality: Quality) -> Page:
+    """A page that cannot be taken apart, texel by texel."""
+    opaque = is_opaque(page.features_u8)
+    features = np.where(opaque[..., None], recoding.bytes_of(recoding.coordinates(page.features_u8)), np.uint8(0))
+    return replace(page, features_u8=features, colors_u8=rounded_colors(page.colors_u8, quality.fallback_db))

@@ -1,0 +1,170 @@
+"""A page taken apart into quads, each with a patch: the rectangle of texels that it shows.
+
+Patches of all sizes lie one after the other in one array; patch n is rows offsets[n] to offsets[n] + h * w.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.baked import Page
+from core.conventions import FEATURE_CHANNELS, is_opaque
+
+CHANNELS = FEATURE_CHANNELS + 3  # features, then the fallback's colour
+# How far, in texels, a corner may be from a texel's centre: float32 on 4096 texels gives 2e-4, other tools' decimals
+# 2e-3.
+OFF_CENTRE = 0.01
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Attributes:
+    sizes: int64 [N, 2], (height, width) in texels.
+    texels: uint8 [T, 11], row-major within a patch: eight features, then red, green, blue of the fallback.
+    """
+
+    sizes: np.ndarray
+    texels: np.ndarray
+
+    @property
+    def areas(self) -> np.ndarray:
+        """[N] texels."""
+        areas: np.ndarray = self.sizes.prod(1)
+        return areas
+
+    @property
+    def offsets(self) -> np.ndarray:
+        """[N] first row of each patch."""
+        offsets: np.ndarray = np.cumsum(self.areas) - self.areas
+        return offsets
+
+    def by_size(self, most_texels: int, numbers: np.ndarray | None = None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """(numbers [n], texels [n, h, w, 11]) of patches of one size, about `most_texels` at a time.
+
+        Args:
+            numbers: the patches to go through; None: all.
+        """
+        numbers = np.arange(len(self.sizes)) if numbers is None else numbers
+        offsets, sizes = self.offsets, self.sizes[numbers]
+        for height, width in np.unique(sizes, axis=0):
+            equal = numbers[(sizes == (height, width)).all(1)]
+            at_once = max(1, most_texels // (height * width))
+            for first in range(0, len(equal), at_once):
+                some = equal[first : first + at_once]
+                rows = offsets[some][:, None] + np.arange(height * width)
+                yield some, self.texels[rows].reshape(len(some), height, width, CHANNELS)
+
+
+@dataclass(frozen=True)
+class Quads:
+    """Attributes:
+    corners: float32 [Q, 4, 3], object frame.
+    ends: bool [Q, 4, 2]: whether a corner stands on the last column (x) and the last row (y) of its patch.
+    triangles: uint32 [Q, 2, 3], of a quad's corners 0 to 3.
+    patch: int64 [Q], which patch each shows.
+    patches: theirs.
+    """
+
+    corners: np.ndarray
+    ends: np.ndarray
+    triangles: np.ndarray
+    patch: np.ndarray
+    patches: Patches
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    def subset(self, keep: np.ndarray) -> "Quads":
+        """The quads that `keep` ([Q] bool, or numbers) picks; the patches stay."""
+        return Quads(self.corners[keep], self.ends[keep], self.triangles[keep], self.patch[keep], self.patches)
+
+    def in_order_of_patches(self) -> "Quads":
+        """Stable: what lies together on a page comes together in the buffers."""
+        return self.subset(np.argsort(self.patch, kind="stable"))
+
+    def world_areas(self) -> np.ndarray:
+        """[Q] float64: the two triangles' area, object units squared."""
+        corners = self.corners.astype(np.float64)[np.arange(len(self))[:, None, None], self.triangles]
+        sides = corners[:, :, 1:] - corners[:, :, :1]
+        areas: np.ndarray = np.linalg.norm(np.cross(sides[:, :, 0], sides[:, :, 1]), axis=-1).sum(1) / 2
+        return areas
+
+
+def quads_of(page: Page) -> Quads | None:
+    """The page's quads; None where it is made of something else than quads with patches.
+
+    A quad is two triangles that follow each other and have four corners together, which stand on the centres of the
+    corner texels of an upright rectangle.
+    """
+    triangles = page.triangles
+    if len(triangles) % 2:
+        return None
+    pairs = triangles.reshape(-1, 6)
+    ordered = np.sort(pairs, axis=1)
+    fresh = np.concatenate([np.ones((len(pairs), 1), bool), ordered[:, 1:] != ordered[:, :-1]], 1)
+    if not (fresh.sum(1) == 4).all():
+        return None
+    vertices = ordered[fresh].reshape(-1, 4)
+    height, width = page.features_u8.shape[:2]
+    at = page.texcoords[vertices].astype(np.float64) * (width, height)
+    texel = np.clip(np.floor(at), 0, (width - 1, height - 1)).astype(np.int64)
+    low, high = texel.min(1), texel.max(1)
+    ends = (texel == high[:, None]) & (high != low)[:, None]
+    upright = ((texel == low[:, None]) | (texel == high[:, None])).all() and (
+        np.abs(at - texel - 0.5) < OFF_CENTRE
+    ).all()
+    if not (upright and (_distinct_ends(ends, high - low + 1)).all()):
+        return None
+    local = np.argmax(pairs[:, :, None] == vertices[:, None, :], axis=2).astype(np.uint32)
+    sizes = (high - low + 1)[:, ::-1]
+    return Quads(
+        page.positions[vertices],
+        ends,
+        local.reshape(-1, 2, 3),
+        np.arange(len(pairs)),
+        Patches(sizes, _texels(page, low, sizes)),
+    )
+
+
+def _distinct_ends(ends: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """[Q] bool: the four corners are at different ends, as far as the patch has different ends."""
+    code = ends[..., 0] + 2 * ends[..., 1]
+    count = (np.sort(code, axis=1)[:, 1:] != np.sort(code, axis=1)[:, :-1]).sum(1) + 1
+    expected: np.ndarray = count == np.where(size > 1, 2, 1).prod(1)
+    return expected
+
+
+def _texels(page: Page, low: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """[T, 11] of the rectangles that start at columns and rows `low` [Q, 2]."""
+    areas = sizes.prod(1)
+    starts = np.cumsum(areas) - areas
+    texels = np.empty((int(areas.sum()), CHANNELS), np.uint8)
+    for height, width in np.unique(sizes, axis=0):
+        some = np.flatnonzero((sizes == (height, width)).all(1))
+        rows = low[some, 1][:, None, None] + np.arange(height)[:, None]
+        columns = low[some, 0][:, None, None] + np.arange(width)
+        to = (starts[some][:, None] + np.arange(height * width)).reshape(rows.shape[0], height, width)
+        texels[to, :FEATURE_CHANNELS] = page.features_u8[rows, columns]
+        texels[to, FEATURE_CHANNELS:] = page.colors_u8[rows, columns]
+    return texels
+
+
+def joined(parts: list[Quads]) -> Quads:
+    """All quads of several pages."""
+    shifts = np.cumsum([0, *(len(part.patches.sizes) for part in parts[:-1])])
+    patches = Patches(
+        np.concatenate([part.patches.sizes for part in parts]), np.concatenate([part.patches.texels for part in parts])
+    )
+    return Quads(
+        np.concatenate([part.corners for part in parts]),
+        np.concatenate([part.ends for part in parts]),
+        np.concatenate([part.triangles for part in parts]),
+        np.concatenate([part.patch + shift for part, shift in zip(parts, shifts, strict=True)]),
+        patches,
+    )
+
+
+def opaque_texels(texels: np.ndarray) -> np.ndarray:
+    """[...] bool of texels [..., 11]."""
+    return is_opaque(texels)

@@ -1,0 +1,73 @@
+"""Lossless WebP of RGBA bytes, and its careful inverse."""
+
+import io
+import struct
+
+import numpy as np
+from PIL import Image
+
+from core.conventions import MAX_PAGE_SIZE_PX
+from exporters.invalid import invalid
+
+# Measured on lego at 400 px, recoded features of 2048², one core: method 0 quality 0 takes 0.9 s for 14.4 MB, method 2
+# quality 20 1.9 s for 13.2 MB, method 4 quality 50 2.9 s for 12.6 MB, method 6 quality 100 28 s for 12.5 MB.
+METHOD, EFFORT = 4, 50
+QUICK_METHOD, QUICK_EFFORT = 0, 10
+QUICK_FROM_TEXELS = 1 << 23  # beyond it, a page takes longer than people wait for a percent
+
+_SIGNATURE = struct.Struct("<4sI4s4sIBI")  # RIFF, length, WEBP, VP8L, length, 0x2f, sizes
+_ONE_BYTE_MARK = 0x2F
+_DECODING_ERRORS = (Image.DecompressionBombError, EOFError, OSError, SyntaxError, ValueError, struct.error)
+
+
+def is_webp(data: bytes) -> bool:
+    """Whether the file says that it is one."""
+    return data[:4] == b"RIFF" and data[8:12] == b"WEBP"
+
+
+def encode_webp(image: np.ndarray, *, exact: bool = True, quick: bool = False) -> bytes:
+    """A lossless WebP file of a uint8 [height, width, 4] image, straight alpha, no colour profile.
+
+    Args:
+        exact: every byte is kept. Without, colours under alpha 0 become what compresses best.
+        quick: some percent larger, three times as fast.
+    """
+    file = io.BytesIO()
+    method, effort = (QUICK_METHOD, QUICK_EFFORT) if quick else (METHOD, EFFORT)
+    pixels = Image.fromarray(np.ascontiguousarray(image))
+    pixels.save(file, "WEBP", lossless=True, exact=exact, method=method, quality=effort)
+    return file.getvalue()
+
+
+def webp_size(data: bytes, subject: str) -> tuple[int, int]:
+    """(height, width) from the header alone.
+
+    Raises:
+        AssetInvalid: not a plain lossless WebP (no animation, no metadata), or larger than a page may be.
+    """
+    if len(data) < _SIGNATURE.size:
+        raise invalid(subject, "must be a WebP image", f"{len(data)} bytes")
+    riff, _, webp, kind, _, mark, sizes = _SIGNATURE.unpack_from(data)
+    if (riff, webp, kind, mark) != (b"RIFF", b"WEBP", b"VP8L", _ONE_BYTE_MARK):
+        raise invalid(subject, "must be a lossless WebP image", f"a chunk {kind!r}")
+    width, height = 1 + (sizes & 0x3FFF), 1 + (sizes >> 14 & 0x3FFF)
+    if not (width <= MAX_PAGE_SIZE_PX and height <= MAX_PAGE_SIZE_PX):
+        raise invalid(subject, f"must have 1 to {MAX_PAGE_SIZE_PX} px a side", f"{width} x {height} px")
+    return height, width
+
+
+def decode_webp(data: bytes, subject: str) -> np.ndarray:
+    """uint8 [height, width, 4]; its size is checked before anything is decoded.
+
+    Raises:
+        AssetInvalid
+    """
+    height, width = webp_size(data, subject)
+    try:
+        with Image.open(io.BytesIO(data), formats=["WEBP"]) as image:
+            if image.size != (width, height):
+                raise ValueError("it states two sizes")
+            pixels = np.array(image.convert("RGBA"))  # opaque ones come without alpha
+    except _DECODING_ERRORS as error:
+        raise invalid(subject, "must be an intact WebP image", f"one that does not decode ({error})") from error
+    return pixels

@@ -8,7 +8,7 @@ from exporters.gltf.placement import nearest_rotation
 from exporters.usd import schema
 from exporters.usd.matrices import from_usd, to_usd
 
-APERTURE = 36.0  # width of the film, tenths of a unit, which renderers read as millimetres
+APERTURE = 0.36  # width of the film: 36 mm, in tenths of a metre
 NEAR_SHARE, FAR_SHARE = 1e-3, 1e2  # of the scene's diagonal
 
 

@@ -17,11 +17,13 @@ sys.meta_path.insert(0, Blocked())
 from exporters.check import check_glb
 from exporters.gltf import read_glb, read_gltf, read_shaders, write_glb, write_gltf
 from exporters.mobilenerf import read_mobilenerf, write_mobilenerf
+from exporters.usd import read_usd, write_usd
 from tests.scenes import tiny_scene
 
 glb = write_glb(tiny_scene())["scene.glb"]
 assert [finding.severity for finding in check_glb(glb)] == ["note"]
 assert read_gltf(write_gltf(tiny_scene())).quad_count == read_mobilenerf(write_mobilenerf(tiny_scene())).quad_count
+assert read_usd(write_usd(tiny_scene())).quad_count == 48
 print(read_glb(glb).quad_count, *sorted(read_shaders(glb)))
 """
 

@@ -32,7 +32,7 @@ from core.training.voxel_stage import VoxelStage
 STAGE_SHARES = {"voxels": 0.20, "field": 0.22, "texels": 0.52, "bake": 0.06}
 REPORT_INTERVAL_S = 0.5
 # To be raised when a stage keeps other things: checkpoints of another format are ignored, not misread.
-CHECKPOINT_FORMAT = 3
+CHECKPOINT_FORMAT = 4
 PREVIEW_INTERVAL_S = 20.0
 MAX_SEED = 2**31 - 1
 
@@ -113,11 +113,14 @@ class _Run:
         if state is not None:
             self._seconds = dict(state["seconds"])
         with self._timed("region"):
-            pool = PixelPool(self.capture.train, self.region.frame, self.device, seed=self.seed)
+            pool = self._pool = PixelPool(self.capture.train, self.region.frame, self.device, seed=self.seed)
+        if state is not None and state["log_gains"] is not None:
+            pool.log_gains = state["log_gains"].to(self.device)
         common = self.network, self.settings, self.seed, self.device
         if stage_name == "voxels":
             voxels = VoxelStage(self.capture, self.region, *common)
             self._train(voxels, state)
+            pool.log_gains = voxels.log_gains
             with self._timed("field"):
                 field = FieldStage.after(voxels, pool)
             del voxels
@@ -146,7 +149,8 @@ class _Run:
             self._seconds[stage.name] = before + time.monotonic() - start
             self._report(stage)
             if self._checkpoint.due():
-                self._checkpoint.write(stage.name, {**stage.state(), "seconds": self._seconds})
+                shared = {"seconds": self._seconds, "log_gains": self._pool.log_gains}
+                self._checkpoint.write(stage.name, {**shared, **stage.state()})
 
     def _baked(self, texels: TexelStage) -> BakedScene:
         with self._timed("bake"):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from core.capture import Capture
 from core.field.network import shade
@@ -17,6 +17,7 @@ from core.field.region import Region
 from core.field.space import SHELLS, TAPER
 from core.field.voxels import EMPTY_DENSITY, HIGHEST_DENSITY, VoxelField
 from core.presets import Settings
+from core.training.exposure import LEAST_SPREAD, BrightnessSurvey, exposure_differences, spread_of
 from core.training.loss import color_error, pixel_loss
 from core.training.marcher import Marcher
 from core.training.pixels import PixelPool
@@ -38,6 +39,9 @@ FINAL_RATE = 0.2
 DENSITY_DECAY = 0.05  # empty space must cost something; falls to nothing
 OCCUPANCY_INTERVAL = 100
 SMALLEST_IMAGE_PX = 100
+# Exposure is looked for before these levels. Earlier the field is too coarse; later it has learned part of it as shine.
+EVENED_LEVELS = (2, 3)
+BRIGHTNESS_PIXELS, BRIGHTNESS_BATCH = 400, 4096  # per photo; at once
 PIXELS_PER_NODE = 1.5  # photos finer than the grid teach it nothing
 
 
@@ -72,6 +76,7 @@ class VoxelStage(Stage):
     ) -> None:
         super().__init__(network, settings, settings.voxel_steps, seed, device)
         self.capture, self.region = capture, region
+        self.log_gains: Tensor | None = None  # [photos, 3], see core/training/exposure.py; None: no differences
         self._density_rate = OPEN_DENSITY_RATE.get(region.space.kind, DENSITY_RATE)
         self._distortion = settings.distortion * OPEN_DISTORTION.get(region.space.kind, 1.0)
         self._levels = levels_of(settings)
@@ -82,6 +87,7 @@ class VoxelStage(Stage):
         largest = max(max(view.camera.size_px) for view in self.capture.train)
         factor = min(round(largest / (PIXELS_PER_NODE * field.nodes)), largest // SMALLEST_IMAGE_PX)
         self._pool = PixelPool(self.capture.train, self.region.frame, self.device, max(1, factor), self.seed)
+        self._pool.log_gains = self.log_gains
         self._steps_here = 0
 
     def _level(self) -> Level:
@@ -90,6 +96,8 @@ class VoxelStage(Stage):
     def step(self, rng: np.random.Generator) -> float:
         level = self._level()
         if level.nodes != self.field.nodes:
+            if self._levels.index(level) in EVENED_LEVELS:
+                self._even_exposure()
             self._enter(self.field.upsampled(level.nodes))
             self._update_occupancy(level)
         elif self._steps_here and self._steps_here % OCCUPANCY_INTERVAL == 0:
@@ -112,6 +120,22 @@ class VoxelStage(Stage):
         self.marcher.adam(rates, decay, (EMPTY_DENSITY, HIGHEST_DENSITY), self._steps_here)
         return color_error(color, A, batch.color, batch.alpha)
 
+    def _even_exposure(self) -> None:
+        """Finds how differently the photos are exposed; from now on their colours are freed of it."""
+        cameras = [view.camera for view in self.capture.train]
+        survey, rng = BrightnessSurvey(len(cameras), self.device), np.random.default_rng([self.seed, 4])
+        jitter = torch.full((BRIGHTNESS_BATCH,), 0.5, device=self.device)
+        for _ in range(-(-len(cameras) * BRIGHTNESS_PIXELS // BRIGHTNESS_BATCH)):
+            batch = self._pool.draw(rng, BRIGHTNESS_BATCH, supersampled=False)
+            F, A = self.marcher.forward(batch.origins, batch.directions, jitter)
+            with torch.no_grad():
+                color = shade(self.network, F, A, batch.centre_directions)
+            survey.add(color, A, batch.color, batch.alpha, batch.image)
+        differences = exposure_differences(survey.log_ratios(), cameras)
+        if self.log_gains is not None or spread_of(differences) >= LEAST_SPREAD:
+            more = torch.from_numpy(differences.astype(np.float32)).to(self.device)
+            self.log_gains = more if self.log_gains is None else self.log_gains + more
+
     def _update_occupancy(self, level: Level) -> None:
         self.field.update_occupancy(level.occupancy_cells, self.region.hull)
         self.marcher.refresh()
@@ -120,6 +144,7 @@ class VoxelStage(Stage):
         return {
             "nodes": self.field.nodes,
             "steps_here": self._steps_here,
+            "log_gains": self.log_gains,
             "occupied": self.field.occupied,
             "trained": self.field.parameters.trained,
             "rows": self.field.parameters.rows(),
@@ -131,5 +156,6 @@ class VoxelStage(Stage):
         field.occupied = state["occupied"].to(self.device)
         field.parameters = field.parameters.training(state["trained"].to(self.device))
         field.parameters.restore_rows(state["rows"])
+        self.log_gains = None if state["log_gains"] is None else state["log_gains"].to(self.device)
         self._enter(field)
         self._steps_here = state["steps_here"]

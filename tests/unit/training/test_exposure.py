@@ -1,11 +1,16 @@
 """Exposure differences between photos: told from shine, and evened."""
 
-from dataclasses import replace
+from copy import deepcopy
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 import torch
 
+from core.capture import Capture
+from core.field.network import new_network
+from core.field.region import find_region
+from core.presets import settings_for
 from core.training.exposure import (
     LEAST_PIXELS,
     LEAST_SPREAD,
@@ -15,11 +20,15 @@ from core.training.exposure import (
     spread_of,
 )
 from core.training.pixels import PixelPool
-from tests.unit.training.captures import ring_cameras
+from core.training.voxel_stage import VoxelStage
+from tests.unit.training.captures import ball, capture_of, ring_cameras
 from tests.unit.training.test_pixels import FRAME, marked_views, without_alpha
 
 CAMERAS = ring_cameras(60, 8)
 PLACES = np.array([camera.position for camera in CAMERAS])
+SETTINGS = settings_for(
+    "draft", cells=12, patch=3, nodes=32, voxel_steps=120, field_steps=1, texel_steps=1, voxel_batch=512
+)
 
 
 def as_seen(gains: np.ndarray, rng, pixels: int = 4000) -> np.ndarray:
@@ -105,3 +114,60 @@ def test_batches_are_freed_of_their_photos_exposure(rng, change):
     freed = pool.draw(np.random.default_rng(1), 200, supersampled=False)
     torch.testing.assert_close(freed.color, plain.color * torch.exp(-pool.log_gains[plain.image]))
     torch.testing.assert_close(freed.alpha, plain.alpha)
+
+
+def exposed(capture: Capture, gains: np.ndarray) -> Capture:
+    """The capture, its training photos times gains [photos]."""
+    train = []
+    for view, gain in zip(capture.train, gains, strict=True):
+        image = view.image_u8.astype(float)
+        image[..., :3] *= gain
+        train.append(replace(view, image_u8=np.rint(np.clip(image, 0, 255)).astype(np.uint8)))
+    return replace(capture, train=tuple(train))
+
+
+def trained(capture: Capture, until: float = 1.0) -> VoxelStage:
+    stage = VoxelStage(capture, find_region(capture), new_network(0), SETTINGS, 0, "cpu")
+    while stage.fraction < until:
+        stage.advance()
+    return stage
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A capture whose photos are exposed unlike, a stage that has trained on it, and the same at two thirds."""
+
+    capture: Capture
+    gains: np.ndarray
+    stage: VoxelStage
+    earlier: dict
+
+
+@pytest.fixture(scope="module")
+def watched() -> Watched:
+    gains = np.random.default_rng(0).uniform(0.75, 1.25, 40)
+    capture = exposed(capture_of(ball(), views=40, held_out=1), gains)
+    stage = trained(capture, 0.66)
+    earlier = deepcopy(stage.state())
+    while stage.done < stage.steps:
+        stage.advance()
+    return Watched(capture, gains, stage, earlier)
+
+
+def test_photos_exposed_unlike_are_evened_while_the_field_trains(watched):
+    truth = np.log(watched.gains) - np.log(watched.gains).mean()
+    found = watched.stage.log_gains.mean(1).numpy()
+    # What looks like shine, 12 of 40 dimensions, is left to it.
+    assert spread_of(found - truth) < 0.7 * spread_of(truth)
+    assert np.corrcoef(found, truth)[0, 1] > 0.8
+    assert watched.stage._pool.log_gains is watched.stage.log_gains
+
+
+def test_a_stage_that_goes_on_knows_the_exposures(watched):
+    again = VoxelStage(watched.capture, find_region(watched.capture), new_network(0), SETTINGS, 0, "cpu")
+    again.restore(watched.earlier)
+    assert torch.equal(again._pool.log_gains, watched.earlier["log_gains"])
+
+
+def test_photos_exposed_alike_are_left_as_they_are():
+    assert trained(capture_of(ball(), views=40, held_out=1)).log_gains is None

@@ -24,6 +24,7 @@ PolyfieldError
 |  `- AssetInvalid           asset-invalid           a .glb that cannot be read back
 |- SceneInvalid              scene-invalid           a BakedScene that breaks its own rules
 |- CheckpointInvalid         checkpoint-invalid
+|- ViewerMissing             viewer-missing          the viewer's files, which a bundle is made of, are not installed
 |- PosingFailed              posing-failed           COLMAP crashed, again and again
 `- TrainingFailed            training-failed         diverged, or the field came out empty
 """
@@ -143,6 +144,10 @@ class AssetInvalid(InputError):
 
 class SceneInvalid(PolyfieldError):
     code = "scene-invalid"
+
+
+class ViewerMissing(PolyfieldError):
+    code = "viewer-missing"
 
 
 class CheckpointInvalid(PolyfieldError):

@@ -7,13 +7,26 @@ const GLB_MAGIC = 0x46546c67; // "glTF", little-endian
 
 /** @typedef {{name: string, read: (onProgress: (share: number) => void) => Promise<ArrayBuffer>, url: string}} Source */
 
-/** The source that the page's address names (`?job=ID` or `?src=URL`), or null. @returns {Promise<Source | null>} */
+/** The source that the page's address names (`?job=ID` or `?src=URL`) or that the page brings along, or null.
+ * @returns {Promise<Source | null>} */
 export async function sourceOfAddress(search = location.search) {
   const parameters = new URLSearchParams(search);
   const job = parameters.get("job");
   if (job) return sourceOfUrl(artifactUrl(job, "scene.glb"), await getJob(job).then(nameOfJob, () => job));
   const src = parameters.get("src");
-  return src ? sourceOfUrl(new URL(src, document.baseURI).href) : null;
+  return src ? sourceOfUrl(new URL(src, document.baseURI).href) : sourceOfPage();
+}
+
+/** What a bundle was made for: a file beside the page (a meta tag), or one within it (a script of base64 text). */
+function sourceOfPage() {
+  const beside = document.querySelector('meta[name="polyfield-scene"]');
+  if (beside) return sourceOfUrl(new URL(beside.content, document.baseURI).href, beside.dataset.title);
+  const within = document.getElementById("polyfield-scene");
+  if (!within) return null;
+  const name = within.dataset.title;
+  const bytes = Uint8Array.from(atob(within.textContent), (letter) => letter.charCodeAt(0));
+  const url = URL.createObjectURL(new Blob([bytes], { type: "model/gltf-binary" }));
+  return { name, url, read: async () => checked(bytes.buffer, name) };
 }
 
 /** @returns {Source} */

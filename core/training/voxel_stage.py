@@ -32,8 +32,8 @@ DENSITY_RATE, FEATURE_RATE, NETWORK_RATE = 0.3, 0.03, 5e-3
 # distortion loss 10 times as strong, 4.5 dB less on the training views at 0.08.
 # Fox, whose cameras stand within the grid, does better with twice that and a distortion loss three times as strong
 # (192 nodes: 24.7 dB and 27.1 on the training views, instead of 24.3 and 29.3 with 224 nodes).
-OPEN_DENSITY_RATE = {TAPER: 0.04, SHELLS: 0.08}
-OPEN_DISTORTION = {TAPER: 0.1, SHELLS: 0.33}  # of the settings' distortion
+OPEN_DENSITY_RATES = {TAPER: 0.04, SHELLS: 0.08}
+OPEN_DISTORTIONS = {TAPER: 0.1, SHELLS: 0.33}  # of the settings' distortion
 # Rates fall to this share, exponentially. 0.03 costs 1 dB in 2000 steps, 0.3 gains 0.2.
 FINAL_RATE = 0.2
 DENSITY_DECAY = 0.05  # empty space must cost something; falls to nothing
@@ -77,8 +77,8 @@ class VoxelStage(Stage):
         super().__init__(network, settings, settings.voxel_steps, seed, device)
         self.capture, self.region = capture, region
         self.log_gains: Tensor | None = None  # [photos, 3], see core/training/exposure.py; None: no differences
-        self._density_rate = OPEN_DENSITY_RATE.get(region.space.kind, DENSITY_RATE)
-        self._distortion = settings.distortion * OPEN_DISTORTION.get(region.space.kind, 1.0)
+        self._density_rate = OPEN_DENSITY_RATES.get(region.space.kind, DENSITY_RATE)
+        self._distortion = settings.distortion * OPEN_DISTORTIONS.get(region.space.kind, 1.0)
         self._levels = levels_of(settings)
         self._enter(VoxelField.new(region.space, self._levels[0].nodes, region.hull, seed, device))
 

@@ -55,10 +55,10 @@ def test_uploaded_folder_becomes_a_job_that_can_be_cancelled_and_deleted(
 
 
 def test_refusal_of_the_service_is_shown_with_its_remedy(start: Page, folder: Path) -> None:
-    start.set_input_files("#pick-files", list(folder.rglob("*.png")))
+    start.set_input_files("#pick-files", sorted(folder.rglob("*.png"))[:2])
     start.get_by_role("button", name="Make the asset").click()
     problem = start.locator("#upload-problem")
-    expect(problem).to_have_attribute("data-code", "poses-missing")
+    expect(problem).to_have_attribute("data-code", "too-few-images")
     expect(problem.locator("span")).not_to_be_empty()
 
 

@@ -128,7 +128,10 @@ def _binary_loss() -> Iterator[None]:
         backward(tracer, batch, surface, soft, tuple(torch.zeros_like(part) for part in hard), gradients, parts)
         away = wp.to_torch(gradients.alpha)
         touched = (away != 0).any(0)
-        away[0] -= BINARY_LOSS_WEIGHT * touched * _sign(wp.to_torch(surface.alpha) - 0.5)
+        alpha = wp.to_torch(surface.alpha)
+        if hasattr(gradients, "row_of"):  # of a volume, only some nodes train
+            alpha = alpha[wp.to_torch(gradients.row_of) >= 0]
+        away[0] -= BINARY_LOSS_WEIGHT * touched * _sign(alpha - 0.5)
 
     never = 1e9
     changes = (

@@ -75,7 +75,8 @@ def test_points_without_preimage_are_nan():
 @settings(max_examples=30, deadline=None)
 @given(mild, st.integers(20, 90), st.integers(20, 90))
 def test_every_pixel_of_the_pinhole_photo_was_seen(distortion, width, height):
-    lens = Lens((60.0, 62.0), (width * 0.48, height * 0.53), (width, height), distortion)
+    # Corners lie within 0.66 focal lengths, where none of the mild lenses folds.
+    lens = Lens((100.0, 103.0), (width * 0.48, height * 0.53), (width, height), distortion)
     pinhole = lens.pinhole
     x, y = np.meshgrid(np.arange(pinhole.size_px[0]) + 0.5, np.arange(pinhole.size_px[1]) + 0.5)
     seen = lens.pixels(distortion.distort(pinhole.normalised(np.stack([x, y], -1))))

@@ -7,13 +7,14 @@ from fastapi import Request, Response
 from fastapi.responses import FileResponse
 
 from service.errors import ArtifactNotFound
+from service.formats import FORMATS
 from service.job_folder import JobFolder
 
 CAPTURE_JSON, CAPTURE_PICTURE = "capture.json", "capture.png"
-MEDIA_TYPES = {
-    "scene.glb": "model/gltf-binary",
+REPORT = "report.json"
+MEDIA_TYPES = {form.file: form.media_type for form in FORMATS.values()} | {
     "preview.png": "image/png",
-    "report.json": "application/json",
+    REPORT: "application/json",
     CAPTURE_JSON: "application/json",
     CAPTURE_PICTURE: "image/png",
 }
@@ -40,6 +41,14 @@ def capture_summary(folder: JobFolder) -> dict[str, Any] | None:
     return {"lines": report["lines"]}
 
 
+def format_rows(folder: JobFolder) -> dict[str, Any]:
+    """What the report says of each format that was exported; {} until it is there."""
+    try:
+        return json.loads((folder.artifacts / REPORT).read_bytes()).get("formats", {})
+    except FileNotFoundError:
+        return {}
+
+
 def artifact_response(request: Request, folder: JobFolder, name: str) -> Response:
     """The file, a range of it, or 304 where the client has it already.
 
@@ -52,6 +61,8 @@ def artifact_response(request: Request, folder: JobFolder, name: str) -> Respons
         raise ArtifactNotFound(f"artifact {name[:64]!r}", "must exist", "no such file", remedy)
     # The preview changes while a job runs, so a cache has to ask each time; the ETag makes asking cheap.
     headers = {"Cache-Control": "no-cache", "X-Content-Type-Options": "nosniff"}
+    if MEDIA_TYPES[name] == "text/html":  # a page of the service's own origin it shall not be
+        headers["Content-Disposition"] = f'attachment; filename="{name}"'
     response = FileResponse(path, headers=headers, media_type=MEDIA_TYPES[name], stat_result=path.stat())
     if _matches(request.headers.get("if-none-match", ""), response.headers["etag"]):
         return Response(status_code=304, headers=headers | {"ETag": response.headers["etag"]})

@@ -1,9 +1,10 @@
 """The whole path: photos -> capture -> scene -> scene.glb, read again and measured."""
 
 import contextlib
+import json
 import shutil
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,12 @@ from core.presets import settings_for
 from core.progress import ProgressCallback, ignore_progress
 from core.reconstruct import reconstruct
 from core.scene_kind import AUTO
-from exporters.gltf import read_glb, write_glb
 from service.atomic import write_atomically
 from service.capture_source import opened_capture
+from service.formats import DEFAULT, FORMATS, FormatRow
+from service.formats.exporting import NO_VIEWS, exported
+from service.formats.measure import BEST_PSNR, Measure
+from service.formats.source import Source
 from service.prepared import Preparation, ReportCallback
 from service.preview import png_bytes, preview
 from service.report import Figure, Report
@@ -27,7 +31,6 @@ SCENE, PREVIEW, REPORT = "scene.glb", "preview.png", "report.json"
 POSING = "posing"
 NO_HELD_OUT = "No view is held out, so the quality was not measured."
 RESUMED = "Training was interrupted and went on from its checkpoint."
-BEST_PSNR = 100.0  # what an infinite one is reported as: JSON has no infinity
 
 
 def convert(
@@ -43,6 +46,8 @@ def convert(
     background: tuple[float, float, float] = WHITE,
     scene_kind: str = AUTO,
     skip_missing: bool = False,
+    formats: Sequence[str] = DEFAULT,
+    title: str = "",
     progress: ProgressCallback = ignore_progress,
     on_report: ReportCallback = lambda report: None,
     checkpoint_dir: Path | None = None,
@@ -52,7 +57,7 @@ def convert(
     estimated first. Before training it writes the capture report, `capture.json` and `capture.png`.
 
     Every figure is measured on the scene.glb as written, read again: never on the trainer. Each file appears whole or
-    not at all, the report last.
+    not at all, the report last; it is written again as each of the other formats is done.
 
     Args:
         capture_path: a folder, a pose file or a .zip of a capture, or of photos without poses.
@@ -61,6 +66,9 @@ def convert(
         device: auto, cpu, cuda or cuda:N.
         downscale, max_size_px, background, skip_missing: see `read_capture`.
         scene_kind: auto, object, forward or unbounded.
+        formats: what to export beside scene.glb, names of service.formats.FORMATS. One that cannot be made is a row of
+            the report with a problem.
+        title: what the scene is called; by default the name of the capture.
         progress: is told stage and fraction of the whole, and now and then a preview.
         on_report: is told the capture report before training starts.
         checkpoint_dir: kept up to date while training; a conversion that was stopped goes on from there. Removed on
@@ -73,7 +81,8 @@ def convert(
             report is written all the same.
         TrainingFailed
     """
-    stages = Stages(progress)
+    others = [name for name in formats if name not in DEFAULT]
+    stages = Stages(progress, len(others))
     settings = settings_for(preset, **(overrides or {}))
     device = resolve_device(device)
     photos: dict[str, Any] = {"downscale": downscale, "max_size_px": max_size_px, "background": background}
@@ -89,16 +98,17 @@ def convert(
     )
     stages.add(trained.seconds)
     with stages.stage("export", EXPORT):
-        sizes, scene = _export(trained.scene, out_dir)
+        asset, size = _export(trained.scene, out_dir, title or capture_path.resolve().stem)
+    scene, trained = asset.scene, replace(trained, scene=asset.scene)
     with stages.stage("measure", MEASURE):
         evaluation = evaluate(scene, capture.test, device=device, progress=stages.within(MEASURE))
-        sizes |= _write(out_dir, {PREVIEW: png_bytes(preview(scene, capture, device))})
+        picture = _write(out_dir, PREVIEW, png_bytes(preview(scene, capture, device)))
 
     report = Report(
         psnr=_figure(evaluation, "psnr"),
         ssim=_figure(evaluation, "ssim"),
         seconds=stages.seconds | {"total": sum(stages.seconds.values())},
-        bytes=sizes,
+        bytes={SCENE: size, PREVIEW: picture},
         quads=scene.quad_count,
         triangles=scene.triangle_count,
         pages=len(scene.pages),
@@ -108,24 +118,44 @@ def convert(
         capture=capture_report.as_json(),
         notes=capture.notes + (() if capture.test else (NO_HELD_OUT,)) + ((RESUMED,) if trained.resumed else ()),
     )
-    _write(out_dir, {REPORT: report.as_bytes()})
+    row = FormatRow(SCENE, size, report.psnr.mean, stages.seconds["export"], "" if evaluation.views else NO_VIEWS)
+    report = report.with_format("glb", row)
+    _write(out_dir, REPORT, report.as_bytes())
+    measure = Measure.on(capture, scene.background, device)
+    if measure and report.psnr.mean is not None:
+        measure.remember(scene, report.psnr.mean)
+    del capture
+    for name, row in exported(asset, others, out_dir, measure, lambda name: stages.within_format(others.index(name))):
+        report = report.with_format(name, row).with_seconds("formats", row.seconds)
+        _write(out_dir, REPORT, report.as_bytes())
     if checkpoint_dir:
         shutil.rmtree(checkpoint_dir, ignore_errors=True)
-    stages.report("measure", 1.0, psnr=report.psnr.mean)
+    stages.done(psnr=report.psnr.mean)
     return report
 
 
-def _export(scene: BakedScene, folder: Path) -> tuple[dict[str, int], BakedScene]:
-    """Writes the asset; returns its sizes and the scene that the file holds."""
+def _export(scene: BakedScene, folder: Path, title: str) -> tuple[Source, int]:
+    """Writes the asset; returns what the file holds, and its size."""
     folder.mkdir(parents=True, exist_ok=True)
-    sizes = _write(folder, write_glb(scene))
-    return sizes, read_glb((folder / SCENE).read_bytes())
+    _remove_earlier(folder)
+    form = FORMATS["glb"]
+    size = _write(folder, SCENE, form.write(Source(scene, title)))
+    held = form.read((folder / SCENE).read_bytes())
+    assert isinstance(held, BakedScene)
+    return Source(held, title, folder / SCENE), size
 
 
-def _write(folder: Path, files: Mapping[str, bytes]) -> dict[str, int]:
-    for name, data in files.items():
-        write_atomically(folder / name, data)
-    return {name: len(data) for name, data in files.items()}
+def _remove_earlier(folder: Path) -> None:
+    """Removes the formats that the folder's report lists: they show another scene than the one to come."""
+    with contextlib.suppress(FileNotFoundError, ValueError):
+        listed = json.loads((folder / REPORT).read_bytes()).get("formats", {})
+        for name in listed.keys() & FORMATS.keys():
+            (folder / FORMATS[name].file).unlink(missing_ok=True)
+
+
+def _write(folder: Path, name: str, data: bytes) -> int:
+    write_atomically(folder / name, data)
+    return len(data)
 
 
 def _figure(evaluation: Evaluation, name: str) -> Figure:

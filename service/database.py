@@ -12,6 +12,7 @@ APPLICATION = "polyfield"
 PIPELINE_VERSION = "polyfield-1"
 QUEUE = "conversions"
 WORKFLOW = "convert"
+EXPORT_WORKFLOW = "export"
 PROGRESS_STREAM = "progress"
 
 

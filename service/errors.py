@@ -5,7 +5,9 @@ PolyfieldError
 |- ArtifactNotFound         artifact-not-found
 |- JobBusy                  job-busy               its worker has not let go of it yet
 |- JobInterrupted           job-interrupted        its trainer ended without a result, again and again
+|- JobUnfinished            job-unfinished         it has no scene.glb to export again
 |- RequestInvalid           request-invalid        not a form, or a field of the wrong type
+|- UnknownFormat            unknown-format
 |- StorageFull              storage-full
 `- WorkerRunning            worker-running         two workers may not share a name
 """
@@ -31,8 +33,16 @@ class JobInterrupted(PolyfieldError):
     code: ClassVar[str] = "job-interrupted"
 
 
+class JobUnfinished(PolyfieldError):
+    code: ClassVar[str] = "job-unfinished"
+
+
 class RequestInvalid(InputError):
     code: ClassVar[str] = "request-invalid"
+
+
+class UnknownFormat(InputError):
+    code: ClassVar[str] = "unknown-format"
 
 
 class StorageFull(PolyfieldError):

@@ -26,6 +26,7 @@ class JobFolder:
     artifacts/       what a client may download.
     job.json         the request: id, name, created_at, images, options.
     progress.json    the latest report, for those who come later than the stream's.
+    export.json      the same of the latest export that was asked for once the job had succeeded.
     trainer.log      the trainer's stderr.
     trainer.lock     held by whoever works in the folder.
     """
@@ -81,6 +82,13 @@ class JobFolder:
 
     def remove(self) -> None:
         shutil.rmtree(self.path, ignore_errors=True)
+
+    def export_progress(self) -> dict[str, Any]:
+        """The latest report of an export: id, stage, fraction; {} before the first."""
+        return _read_json(self.path / "export.json")
+
+    def write_export_progress(self, report: dict[str, Any]) -> None:
+        _write_json(self.path / "export.json", report)
 
     @contextmanager
     def lock(self) -> Iterator[IO[bytes]]:

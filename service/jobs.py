@@ -2,16 +2,18 @@
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Callable
+import uuid
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import aclosing
 from datetime import UTC, datetime
 from typing import Any
 
-from dbos import DBOSClient, WorkflowSerializationFormat, WorkflowStatus
+from dbos import DBOSClient, EnqueueOptions, WorkflowSerializationFormat, WorkflowStatus
+from dbos import error as dbos_error
 
-from service.artifacts import capture_summary, list_artifacts
-from service.database import APPLICATION, PROGRESS_STREAM, QUEUE, WORKFLOW
-from service.errors import JobBusy, JobInterrupted, JobNotFound
+from service.artifacts import capture_summary, format_rows, list_artifacts
+from service.database import APPLICATION, EXPORT_WORKFLOW, PROGRESS_STREAM, QUEUE, WORKFLOW
+from service.errors import JobBusy, JobInterrupted, JobNotFound, JobUnfinished
 from service.job_folder import JOB_ID, JobFolder
 from service.problems import problem_of
 from service.settings import ServiceSettings
@@ -27,6 +29,8 @@ STATES = {
 }
 NO_PROGRESS: dict[str, Any] = {"stage": None, "fraction": 0.0, "psnr": None, "preview": False}
 ENDED = ("succeeded", "failed", "cancelled")
+UNENDED = ("DELAYED", "ENQUEUED", "PENDING")
+MAX_EXPORTS = 500  # that a list of jobs looks at
 # A worker looks once a second whether its job was cancelled; ten times that means it hangs.
 RELEASE_TIMEOUT_S = 10.0
 RELEASE_POLL_S = 0.05
@@ -44,22 +48,37 @@ class Jobs:
 
     async def enqueue(self, folder: JobFolder) -> None:
         """Hands a new job to the workers. Only its id goes through the engine."""
-        portable = WorkflowSerializationFormat.PORTABLE
-        await self._client.enqueue_async(
-            {
-                "workflow_name": WORKFLOW,
-                "queue_name": QUEUE,
-                "workflow_id": folder.id,
-                "application_name": APPLICATION,
-                "serialization_type": portable,
-            },
-            folder.id,
-        )
+        await self._client.enqueue_async(_place(WORKFLOW, folder.id), folder.id)
+
+    async def export(self, job_id: str, formats: Sequence[str]) -> dict[str, Any]:
+        """Hands an export of a job that has succeeded to the workers; returns the job.
+
+        Raises:
+            JobNotFound
+            JobUnfinished: it has no scene.glb.
+            JobBusy: an export of it is waiting or in work.
+        """
+        state = (await self.get(job_id))["state"]
+        if state != "succeeded":
+            remedy = (
+                "Wait until it has succeeded." if state in ("queued", "running") else "Only jobs that succeeded can."
+            )
+            raise JobUnfinished(f"job {job_id}", "must have succeeded to be exported", f"one that is {state}", remedy)
+        # The engine lets one export of a job in at a time.
+        place = _place(EXPORT_WORKFLOW, f"{job_id}-{uuid.uuid4().hex[:8]}")
+        place["deduplication_id"] = job_id
+        try:
+            await self._client.enqueue_async(place, job_id, list(formats))
+        except dbos_error.DBOSQueueDeduplicatedError:
+            remedy = "Wait until it is done, or cancel it."
+            raise JobBusy(f"job {job_id}", "must have no export in work", "one that is", remedy) from None
+        return await self.get(job_id)
 
     async def list(self, limit: int = 200) -> list[dict[str, Any]]:
         """The newest jobs first."""
         rows = await self._client.list_workflows_async(name=WORKFLOW, sort_desc=True, limit=limit, load_input=False)
-        return await asyncio.to_thread(lambda: [self._view(row) for row in rows])
+        exports = {_job_of(row): row for row in reversed(await self._exports(limit=MAX_EXPORTS))}
+        return await asyncio.to_thread(lambda: [self._view(row, exports.get(row.workflow_id)) for row in rows])
 
     async def get(self, job_id: str) -> dict[str, Any]:
         """One job.
@@ -68,10 +87,11 @@ class Jobs:
             JobNotFound
         """
         row = await self._row(job_id)
-        return await asyncio.to_thread(self._view, row)
+        latest = await self._exports(workflow_id_prefix=job_id, limit=1)
+        return await asyncio.to_thread(self._view, row, *latest)
 
     async def cancel(self, job_id: str) -> dict[str, Any]:
-        """Stops a job; one that has ended stays as it is. Returns when its trainer is gone: within about a second.
+        """Stops a job; of one that has ended, its export. Returns when its trainer is gone: within about a second.
 
         Raises:
             JobNotFound
@@ -80,6 +100,10 @@ class Jobs:
         if (await self.get(job_id))["state"] not in ENDED:
             await self._client.cancel_workflow_async(job_id)
             await _when_released(self._folder(job_id), JobFolder.drop_inputs)
+            return await self.get(job_id)
+        for row in await self._exports(workflow_id_prefix=job_id, status=list(UNENDED)):
+            await self._client.cancel_workflow_async(row.workflow_id)
+            await _when_released(self._folder(job_id), lambda folder: None)
         return await self.get(job_id)
 
     async def delete(self, job_id: str) -> None:
@@ -90,8 +114,10 @@ class Jobs:
             JobBusy: its trainer does not end.
         """
         await self.cancel(job_id)
-        # The row goes last: a worker learns from it that its job is cancelled.
+        # The rows go last: a worker learns from them that its job is cancelled.
         await _when_released(self._folder(job_id), JobFolder.remove)
+        for row in await self._exports(workflow_id_prefix=job_id):
+            await self._client.delete_workflow_async(row.workflow_id)
         await self._client.delete_workflow_async(job_id)
 
     async def reports(self, job_id: str, after: int = 0) -> AsyncIterator[tuple[int, dict[str, Any]]]:
@@ -125,7 +151,11 @@ class Jobs:
             raise _unknown(job_id)
         return rows[0]
 
-    def _view(self, row: WorkflowStatus) -> dict[str, Any]:
+    async def _exports(self, **chosen: Any) -> Sequence[WorkflowStatus]:
+        """Newest first."""
+        return await self._client.list_workflows_async(name=EXPORT_WORKFLOW, sort_desc=True, **chosen)
+
+    def _view(self, row: WorkflowStatus, export: WorkflowStatus | None = None) -> dict[str, Any]:
         folder = self._folder(row.workflow_id)
         request = folder.request()
         problem = _problem(row)
@@ -141,7 +171,38 @@ class Jobs:
             "capture": capture_summary(folder),
             "problem": problem,
             "artifacts": list_artifacts(folder),
+            "formats": format_rows(folder),
+            "export": _export_view(export, folder) if export else None,
         }
+
+
+def _export_view(row: WorkflowStatus, folder: JobFolder) -> dict[str, Any]:
+    """The latest export of a job."""
+    problem = _problem(row)
+    progress = folder.export_progress()
+    reported = progress if progress.get("id") == row.workflow_id else {}
+    return {
+        "state": "failed" if problem else STATES[row.status],
+        "formats": row.input["args"][1] if row.input else [],
+        "stage": reported.get("stage"),
+        "fraction": reported.get("fraction", 0.0),
+        "problem": problem,
+    }
+
+
+def _place(workflow: str, workflow_id: str) -> EnqueueOptions:
+    """Where in the engine something waits."""
+    return {
+        "workflow_name": workflow,
+        "queue_name": QUEUE,
+        "workflow_id": workflow_id,
+        "application_name": APPLICATION,
+        "serialization_type": WorkflowSerializationFormat.PORTABLE,
+    }
+
+
+def _job_of(export: WorkflowStatus) -> str:
+    return export.workflow_id.partition("-")[0]
 
 
 def _problem(row: WorkflowStatus) -> dict[str, Any] | None:

@@ -9,6 +9,7 @@ from core.capture import WHITE
 from core.errors import OptionInvalid
 from core.presets import settings_for
 from core.scene_kind import AUTO, check_kind_name
+from service.formats import DEFAULT, formats_of
 
 DEVICE = re.compile(r"auto|cpu|cuda(:\d+)?")
 MAX_DOWNSCALE = 16
@@ -32,10 +33,11 @@ class Options:
         background: sRGB in [0, 1], behind the transparent pixels of photos.
         scene_kind: auto, object, forward or unbounded.
         skip_missing: leave out photos that the poses name but the capture lacks.
+        formats: what to export to, names of service.formats.FORMATS; glb is always among them.
         overrides: settings that replace the preset's; numbers may be text.
 
     Raises:
-        UnknownPreset, OptionInvalid
+        UnknownPreset, UnknownFormat, OptionInvalid
     """
 
     preset: str = "balanced"
@@ -46,12 +48,15 @@ class Options:
     background: tuple[float, float, float] = WHITE
     scene_kind: str = AUTO
     skip_missing: bool = False
+    formats: tuple[str, ...] = DEFAULT
     overrides: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if "preset" in self.overrides:
             raise OptionInvalid("setting preset", "must be given as the preset", repr(self.overrides["preset"]))
         settings_for(self.preset, **self.overrides)
+        # Figures are measured on scene.glb, so it is always written.
+        object.__setattr__(self, "formats", formats_of((*DEFAULT, *self.formats)))
         if not DEVICE.fullmatch(self.device):
             raise OptionInvalid("device", "must be auto, cpu, cuda or cuda:N", repr(self.device))
         check_kind_name(self.scene_kind, auto=True)
@@ -66,7 +71,7 @@ class Options:
 
         Args:
             words: any of preset, device, seed, downscale, max_size_px, background ("white", "black", "#rrggbb"),
-                scene_kind and skip_missing ("true", "false").
+                scene_kind, skip_missing ("true", "false") and formats ("all", "web,lq").
             assignments: settings that replace the preset's, as "name=value".
         """
         chosen: dict[str, Any] = {name: words[name] for name in ("preset", "device", "scene_kind") if words.get(name)}
@@ -75,6 +80,8 @@ class Options:
             chosen["background"] = _color(words["background"])
         if words.get("skip_missing"):
             chosen["skip_missing"] = _truth("skip_missing", words["skip_missing"])
+        if words.get("formats"):
+            chosen["formats"] = formats_of(words["formats"])
         return cls(**chosen, overrides=dict(_assignment(text) for text in assignments))
 
     @classmethod
@@ -82,8 +89,23 @@ class Options:
         """The reverse of `as_json`."""
         return cls(**{**value, "background": tuple(value["background"])})
 
+    def photos(self) -> dict[str, Any]:
+        """How photos are read, as arguments of `read_capture`."""
+        names = ("downscale", "max_size_px", "background", "skip_missing")
+        return {name: getattr(self, name) for name in names} | {"kind": self.scene_kind}
+
     def as_json(self) -> dict[str, Any]:
         return asdict(self)
+
+
+def photo_choices(words: Mapping[str, str]) -> dict[str, Any]:
+    """How photos are read, of the words that are given and not empty.
+
+    Raises:
+        OptionInvalid
+    """
+    chosen = Options.from_text(words)
+    return {name: getattr(chosen, name) for name, text in words.items() if text}
 
 
 def _require_between(name: str, value: int, low: int, high: int) -> None:

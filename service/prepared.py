@@ -59,11 +59,8 @@ class Preparation:
         """
         posing = self._posed(source, stages)
         with stages.stage("read", READ):
-            path = posing.folder if posing else source
-            capture = read_capture(path, **self.photos)
-            if posing and len(posing.registered) < HOLD_OUT_FROM:
-                capture = _all_to_train(capture)
-            form = ESTIMATED if posing else convention_of(path)
+            capture = capture_of(source, self.photos, posing)
+            form = ESTIMATED if posing else convention_of(source)
             pixels = sum(view.image_u8.shape[0] * view.image_u8.shape[1] for view in capture.train + capture.test)
             report = report_of_capture(capture, form, expected(self.settings, pixels, self.device), posing)
             self._publish(report, png_bytes(coverage_picture(capture, report.photos)))
@@ -91,6 +88,16 @@ class Preparation:
         write_atomically(self.out_dir / CAPTURE_PICTURE, picture)
         write_atomically(self.out_dir / CAPTURE_JSON, json_bytes(report.as_json()))
         self.on_report(report)
+
+
+def capture_of(source: Path, photos: Mapping[str, Any], posing: Posing | None) -> Capture:
+    """The capture at `source`, read as `photos` says; of photos without poses, with the cameras of `posing`.
+
+    Raises:
+        InputError
+    """
+    capture = read_capture(posing.folder if posing else source, **photos)
+    return _all_to_train(capture) if posing and len(posing.registered) < HOLD_OUT_FROM else capture
 
 
 def _all_to_train(capture: Capture) -> Capture:

@@ -24,6 +24,7 @@ STATUS_BY_CODE = {
     "job-not-found": 404,
     "artifact-not-found": 404,
     "job-busy": 409,
+    "job-unfinished": 409,
     "storage-full": 507,
 }
 

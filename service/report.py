@@ -2,8 +2,12 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, TypeAlias
+
+from service.formats import FORMATS, FormatRow
+
+PLAIN_FILES = ("scene.glb", "preview.png")  # the sizes of all others are in the table of formats
 
 ByteString: TypeAlias = bytes  # Report has a field of that name
 
@@ -40,6 +44,7 @@ class Report:
         views: photos trained on and held out.
         notes: remarks for the user.
         capture: the capture report, as in capture.json.
+        formats: name to what was exported, scene.glb included, or why it is missing.
     """
 
     psnr: Figure
@@ -54,13 +59,28 @@ class Report:
     views: Mapping[str, int]
     notes: tuple[str, ...]
     capture: Mapping[str, Any] = field(default_factory=dict)
+    formats: Mapping[str, FormatRow] = field(default_factory=dict)
 
     @classmethod
     def from_bytes(cls, data: ByteString) -> "Report":
         """The reverse of `as_bytes`."""
         value = json.loads(data)
         figures = {name: Figure(**value[name]) for name in ("psnr", "ssim")}
-        return cls(**{**value, **figures, "notes": tuple(value["notes"])})
+        rows = {name: FormatRow(**row) for name, row in value.get("formats", {}).items()}
+        return cls(**{**value, **figures, "notes": tuple(value["notes"]), "formats": rows})
+
+    def with_format(self, name: str, row: FormatRow) -> "Report":
+        """The report with one format more, or anew."""
+        sizes = {**self.bytes, row.file: row.bytes}
+        rows = {**self.formats, name: row}
+        there = {file: size for file, size in sizes.items() if size is not None}
+        return replace(self, bytes=there, formats={known: rows[known] for known in FORMATS if known in rows})
+
+    def with_seconds(self, stage: str, seconds: float) -> "Report":
+        """The report with a stage that took so much longer."""
+        stages = {name: value for name, value in self.seconds.items() if name != "total"}
+        stages[stage] = stages.get(stage, 0.0) + seconds
+        return replace(self, seconds=stages | {"total": sum(stages.values())})
 
     def as_bytes(self) -> ByteString:
         """report.json."""
@@ -69,7 +89,8 @@ class Report:
     def as_table(self) -> str:
         """For a terminal."""
         seconds = ", ".join(f"{stage} {value:.1f}" for stage, value in self.seconds.items())
-        sizes = ", ".join(f"{name} {size / 1e6:.2f} MB" for name, size in self.bytes.items())
+        plain = {file: size for file, size in self.bytes.items() if file in PLAIN_FILES}
+        sizes = ", ".join(f"{file} {size / 1e6:.2f} MB" for file, size in plain.items())
         rows = {
             "PSNR": _quality(self.psnr, "{:.2f} dB"),
             "SSIM": _quality(self.ssim, "{:.4f}"),
@@ -79,7 +100,24 @@ class Report:
             "device": self.device,
         }
         lines = [f"{name:<8} {value}" for name, value in rows.items()]
+        lines += ["", format_table(self.formats)] if len(self.formats) > 1 else []
         return "\n".join(lines + [f"note: {note}" for note in self.notes])
+
+
+def format_table(rows: Mapping[str, FormatRow]) -> str:
+    """For a terminal: a line for each format."""
+    cells = [("format", "file", "MB", "PSNR dB", "s", "")]
+    for name, row in rows.items():
+        size = "" if row.bytes is None else f"{row.bytes / 1e6:.2f}"
+        quality = "" if row.psnr is None else f"{row.psnr:.2f}"
+        remark = f"missing: {row.problem}" if row.problem else row.note
+        cells.append((name, row.file, size, quality, f"{row.seconds:.1f}", remark))
+    widths = [max(len(line[column]) for line in cells) for column in range(5)]
+    return "\n".join(
+        f"{line[0]:<{widths[0]}}  {line[1]:<{widths[1]}}  {line[2]:>{widths[2]}}  {line[3]:>{widths[3]}}  "
+        f"{line[4]:>{widths[4]}}  {line[5]}".rstrip()
+        for line in cells
+    )
 
 
 def _quality(figure: Figure, form: str) -> str:

@@ -7,6 +7,8 @@ from fastapi.responses import JSONResponse, StreamingResponse
 
 from service.artifacts import artifact_response
 from service.events import job_events, last_event_id
+from service.export_request import BODY, requested_formats
+from service.formats import FORMATS
 from service.jobs import Jobs
 from service.problems import MEDIA_TYPE as PROBLEM
 from service.uploads import receive_job
@@ -33,6 +35,11 @@ FORM = {
             "default": False,
             "description": "leave out photos that the poses name but the capture lacks",
         },
+        "formats": {
+            "type": "string",
+            "default": "glb",
+            "description": f"what to export beside scene.glb: all, or some of {','.join(FORMATS)}",
+        },
         "set": {"type": "array", "items": {"type": "string"}, "description": "name=value, a setting of the preset"},
     },
 }
@@ -51,6 +58,13 @@ def _jobs(request: Request) -> Jobs:
 async def health() -> dict[str, str]:
     """Whether the server answers."""
     return {"status": "ok"}
+
+
+@router.get("/formats")
+async def list_formats() -> dict[str, Any]:
+    """What a scene can be exported to."""
+    keys = ("name", "file", "media_type", "text", "opens_in")
+    return {"formats": [{key: getattr(form, key) for key in keys} for form in FORMATS.values()]}
 
 
 @router.post("/jobs", status_code=202, openapi_extra=UPLOAD)
@@ -90,8 +104,18 @@ async def get_job_events(request: Request, job_id: str) -> StreamingResponse:
 
 @router.post("/jobs/{job_id}/cancel")
 async def cancel_job(request: Request, job_id: str) -> dict[str, Any]:
-    """Stops a job. One that has ended stays as it is."""
+    """Stops a job. One that has ended stays as it is; its export, if there is one, is stopped."""
     return await _jobs(request).cancel(job_id)
+
+
+@router.post("/jobs/{job_id}/exports", status_code=202, openapi_extra=BODY)
+async def create_export(request: Request, job_id: str) -> dict[str, Any]:
+    """Exports a finished job's scene.glb to more formats, without training; one export of a job at a time.
+
+    The answer is the job. Its `export` tells state and progress, its `formats` what has been made.
+    """
+    formats = await requested_formats(request, request.app.state.settings.limits)
+    return await _jobs(request).export(job_id, formats)
 
 
 @router.delete("/jobs/{job_id}", status_code=204)
@@ -104,5 +128,5 @@ async def delete_job(request: Request, job_id: str) -> Response:
 @router.get("/jobs/{job_id}/artifacts/{name}")
 @router.head("/jobs/{job_id}/artifacts/{name}", include_in_schema=False)
 async def get_artifact(request: Request, job_id: str, name: str) -> Response:
-    """`scene.glb`, `preview.png`, `report.json`, `capture.json` or `capture.png`; ranges and ETags are honoured."""
+    """`preview.png`, `report.json`, `capture.json`, `capture.png` or a format's file; ranges and ETags are honoured."""
     return artifact_response(request, _jobs(request).folder(job_id), name)

@@ -16,20 +16,32 @@ EXPORT = (0.95, 0.97)
 MEASURE = (0.97, 1.0)
 # Estimating the cameras of photos without poses comes before all that, and takes about this share of everything.
 POSING_SHARE = 0.25
+# Each format beside scene.glb comes after all that, and takes about this share of everything.
+FORMAT_SHARE = 0.03
+# Where nothing else is done, reading the scene and the photos takes this share.
+EXPORT_ONLY_READ = 0.1
 
 
 class Stages:
     """Times the stages and turns their own fractions into those of the whole, which never fall.
 
+    Args:
+        callback: is told.
+        formats: how many are exported in the end, beside scene.glb.
+        only: nothing but formats is.
+
     Attributes:
         seconds: of each stage that has ended, wall clock.
     """
 
-    def __init__(self, callback: ProgressCallback) -> None:
+    def __init__(self, callback: ProgressCallback, formats: int = 0, *, only: bool = False) -> None:
         self._callback = callback
+        self._formats = formats
+        self._end = EXPORT_ONLY_READ if only else 1.0 - FORMAT_SHARE * formats  # where the formats start
         self._fraction = 0.0
         self._start = 0.0  # where reading starts
         self._psnr: float | None = None
+        self._stage = "read"
         self.seconds: dict[str, float] = {}
 
     @contextmanager
@@ -57,16 +69,30 @@ class Stages:
 
         return inner
 
+    def within_format(self, index: int) -> ProgressCallback:
+        """A callback for one of the formats, which reports its own fraction, 0 to 1."""
+
+        def inner(report: Progress) -> None:
+            done = (index + report.fraction) / self._formats
+            self._send(replace(report, fraction=self._end + (1.0 - self._end) * done))
+
+        return inner
+
     def report(
         self, stage: str, fraction: float, *, psnr: float | None = None, preview_u8: np.ndarray | None = None
     ) -> None:
-        """Reports a fraction of all stages from reading on."""
+        """Reports a fraction of all stages from reading to measuring."""
         self._send(Progress(stage, self._of_whole(fraction), psnr, preview_u8))
 
+    def done(self, *, psnr: float | None = None) -> None:
+        """Reports the end, of whatever stage came last."""
+        self._send(Progress(self._stage, 1.0, psnr))
+
     def _of_whole(self, fraction: float) -> float:
-        return self._start + (1.0 - self._start) * fraction
+        return self._start + (self._end - self._start) * fraction
 
     def _send(self, report: Progress) -> None:
         self._fraction = min(1.0, max(self._fraction, report.fraction))
+        self._stage = report.stage
         self._psnr = report.psnr if report.psnr is not None else self._psnr
         self._callback(replace(report, fraction=self._fraction, psnr=self._psnr))

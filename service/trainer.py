@@ -1,4 +1,7 @@
-"""Runs one job: `python -m service.trainer JOB_FOLDER --parent PID`. See trainer_process for what it writes."""
+"""Runs one job: `python -m service.trainer JOB_FOLDER --parent PID`; with `--formats LIST`, an export of its scene.
+
+See trainer_process for what it writes.
+"""
 
 import argparse
 import json
@@ -11,7 +14,9 @@ from typing import IO, Any
 from core.errors import InputError, PolyfieldError
 from core.progress import Progress
 from service.atomic import write_atomically
-from service.conversion import convert
+from service.conversion import SCENE, convert
+from service.export import export
+from service.formats import formats_of
 from service.job_folder import JobFolder
 from service.options import Options
 from service.parent import end_with_parent
@@ -31,7 +36,10 @@ def main() -> int:
     channel = _claim_stdout()
     folder = JobFolder(arguments.folder)
     try:
-        _run(folder, channel)
+        if arguments.formats:
+            _export(folder, formats_of(arguments.formats), channel)
+        else:
+            _run(folder, channel)
     except PolyfieldError as error:
         _send(channel, problem=problem_of(error))
         logging.exception("refused" if isinstance(error, InputError) else "failed")
@@ -43,11 +51,13 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="service.trainer")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--parent", type=int, required=True)
+    parser.add_argument("--formats", default="", help="export the job's scene, which is there, to these")
     return parser.parse_args()
 
 
 def _run(folder: JobFolder, channel: IO[str]) -> None:
-    options = Options.from_json(folder.request()["options"])
+    request = folder.request()
+    options = Options.from_json(request["options"])
     preview = folder.artifacts / "preview.png"
     # One that goes on from a checkpoint starts behind what was last reported; the bar waits for it there.
     reached = folder.progress().get("fraction", 0.0)
@@ -62,9 +72,31 @@ def _run(folder: JobFolder, channel: IO[str]) -> None:
         folder.capture,
         folder.artifacts,
         **options.as_json(),
+        title=request["name"],
         progress=progress,
         checkpoint_dir=folder.checkpoint,
         posing_dir=folder.posing,
+    )
+
+
+def _export(folder: JobFolder, formats: tuple[str, ...], channel: IO[str]) -> None:
+    """Writes more formats of the job's scene.glb, measured on the photos that were held out of its training."""
+    request = folder.request()
+    options = Options.from_json(request["options"])
+
+    def progress(report: Progress) -> None:
+        _send(channel, report={"stage": report.stage, "fraction": report.fraction})
+
+    export(
+        folder.artifacts / SCENE,
+        folder.artifacts,
+        formats,
+        capture=folder.capture if folder.capture.exists() else None,
+        photos=options.photos(),
+        posing_dir=folder.posing,
+        title=request["name"],
+        device=options.device,
+        progress=progress,
     )
 
 

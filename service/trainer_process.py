@@ -37,7 +37,7 @@ class TrainerHung(Exception):
 
 
 async def run_trainer(
-    command: tuple[str, ...], folder: JobFolder, publish: Publish, stall_s: float
+    command: tuple[str, ...], folder: JobFolder, publish: Publish, stall_s: float, *arguments: str
 ) -> dict[str, Any] | None:
     """Runs the trainer to its end and returns its problem, or None where it succeeded.
 
@@ -45,6 +45,7 @@ async def run_trainer(
 
     Args:
         command: to which the job's folder is appended; the trainer is told this process's id as `--parent`.
+        arguments: of the trainer, beside the folder.
         publish: is given each report, at most two a second, and always the last one.
         stall_s: silence after which the trainer is taken for hung.
 
@@ -58,6 +59,7 @@ async def run_trainer(
             str(folder.path),
             "--parent",
             str(os.getpid()),
+            *arguments,
             stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE,
             stderr=stderr,

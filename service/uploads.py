@@ -37,13 +37,18 @@ async def receive_job(request: Request, settings: ServiceSettings) -> JobFolder:
         await asyncio.to_thread(received.mkdir, parents=True)
         content_type = request.headers.get("content-type", "")
         form = await receive_form(content_type, request.stream(), received, settings.limits)
-        options = Options.from_text(form.words(), form.fields.get(SETTING_FIELD, ()))
+        options = Options.from_text(_words(form), form.fields.get(SETTING_FIELD, ()))
         await asyncio.to_thread(_make_capture, form, received, staging, settings.limits, options)
         accepted = JobFolder(settings.jobs / job_id)
         await asyncio.to_thread(_accept, staging, _request_of(job_id, form, options), accepted)
         return accepted
     finally:
         await asyncio.to_thread(staging.remove)
+
+
+def _words(form: Form) -> dict[str, str]:
+    """The form's fields; formats may be chosen in several."""
+    return form.words() | {"formats": ",".join(form.fields.get("formats", ()))}
 
 
 def _accept(staging: JobFolder, request: dict[str, object], accepted: JobFolder) -> None:

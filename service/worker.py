@@ -9,7 +9,7 @@ from types import FrameType
 
 from dbos import DBOS
 
-from service.database import APPLICATION, PIPELINE_VERSION, QUEUE, prepare
+from service.database import APPLICATION, EXPORT_WORKFLOW, PIPELINE_VERSION, QUEUE, prepare
 from service.errors import WorkerRunning
 from service.job_folder import JobFolder
 from service.liveness import WorkerLock, worker_lock
@@ -129,7 +129,10 @@ def take_over(settings: ServiceSettings, suspects: set[str]) -> set[str]:
 
 def _clean(settings: ServiceSettings) -> None:
     rows = DBOS.list_workflows(load_input=False, load_output=False)
-    old = expired({row.workflow_id: row.completed_at for row in rows}, settings.keep_days, time.time())
+    exports = [row for row in rows if row.name == EXPORT_WORKFLOW and row.completed_at is None]
+    in_export = {row.workflow_id.partition("-")[0] for row in exports}
+    ended = {row.workflow_id: row.completed_at for row in rows if row.workflow_id not in in_export}
+    old = expired(ended, settings.keep_days, time.time())
     for job_id in old:
         JobFolder(settings.jobs / job_id).remove()
     if old:

@@ -5,6 +5,7 @@ import logging
 from dataclasses import replace
 from pathlib import Path
 
+from service.formats import FORMATS
 from service.options import Options
 from service.settings import ServiceSettings
 
@@ -17,6 +18,7 @@ CHOICES = {
     "max-size-px": "reduce the photos to this longest side at most",
     "background": "white, black or #rrggbb, behind transparent pixels",
     "scene-kind": "auto, object, forward or unbounded",
+    "formats": f"what to export beside scene.glb: all, or some of {','.join(FORMATS)}",
 }
 FLAGS = {"skip-missing": "leave out photos that the poses name but the capture lacks"}
 

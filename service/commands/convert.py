@@ -18,7 +18,10 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Stopped with Ctrl-C, it goes on from its checkpoint when started again the same way."""
+    """Exit status 1 where a format could not be made; the others are there.
+
+    Stopped with Ctrl-C, it goes on from its checkpoint when started again the same way.
+    """
     options = options_of(arguments)
     from service.conversion import convert  # late, because it loads PyTorch
 
@@ -33,4 +36,4 @@ def run(arguments: argparse.Namespace) -> int:
         )
     print(report.as_table())
     print(f"written to {arguments.out}")
-    return 0
+    return 1 if any(row.problem for row in report.formats.values()) else 0

@@ -10,6 +10,7 @@ from core.field.voxels import VoxelField
 from core.kernels.adam import adam_grid, bias_correction
 from core.kernels.launch import launch
 from core.kernels.march import Samples, march_backward, march_forward, survey
+from core.kernels.smoothness import smoothness_gradient
 from core.kernels.types import vec8
 from core.training.survey import Survey
 
@@ -64,6 +65,16 @@ class Marcher:
         shared = [as_vec3(origins), as_vec3(directions), self.samples, self._grid.space,
                   found.cells, found.shells]  # fmt: skip
         launch(survey, len(origins), lambda part: [*shared, part, *outputs], self.device, found.peak.shape[0])
+
+    def smooth(self, weight: float) -> None:
+        """Adds the gradient of the features' smoothness to the rows that the last `backward` touched."""
+        learned = self.field.parameters
+        inputs = [
+            self.field.nodes, weight, wp.from_torch(learned.trained), wp.from_torch(learned.row_of),
+            wp.from_torch(self._touched), wp.from_torch(learned.features, dtype=vec8),
+            wp.from_torch(learned.gradients[1], dtype=vec8),
+        ]  # fmt: skip
+        launch(smoothness_gradient, len(learned.trained), inputs, self.device)
 
     def adam(self, rates: tuple[float, float], decay: float, bounds: tuple[float, float], steps: int) -> None:
         step_grid(self.field.parameters, self._touched, rates, decay, bounds, steps, self.device)

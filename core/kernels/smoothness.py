@@ -1,0 +1,38 @@
+"""The pull of a grid's features towards their neighbours: the gradient of core/oracles/smoothness.py."""
+
+import warp as wp
+
+from core.kernels.types import vec8
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel
+def smoothness_gradient(
+    first: int,
+    nodes: int,  # per axis
+    weight: float,
+    trained: wp.array(dtype=wp.int32),  # [rows]
+    row_of: wp.array(dtype=wp.int32),  # [nodes^3], or -1
+    touched: wp.array(dtype=wp.uint8),  # [rows]
+    features: wp.array(dtype=vec8),  # [nodes^3]
+    grad_features: wp.array2d(dtype=vec8),  # [parts, rows]
+):
+    """Adds the gradient to the first accumulator of the touched rows. Features are only read: ranges share nothing."""
+    row = first + wp.tid()
+    if touched[row] == wp.uint8(0):
+        return
+    i = trained[row]
+    pull = vec8()
+    stride = int(1)
+    for _axis in range(3):
+        place = (i // stride) % nodes
+        # Warp evaluates both sides of an `and`: nested, nothing beyond the grid is read.
+        if place > 0:  # noqa: SIM102
+            if row_of[i - stride] >= 0:
+                pull += features[i] - features[i - stride]
+        if place < nodes - 1:  # noqa: SIM102
+            if row_of[i + stride] >= 0:
+                pull += features[i] - features[i + stride]
+        stride *= nodes
+    grad_features[0, row] += weight * pull

@@ -118,5 +118,6 @@ BAD_INPUTS = {
     "all transparent": BadInput(_transparent, "capture-empty", 422, ("transparent",), decoded=True),
     "unknown preset": BadInput(capture_files, "unknown-preset", 422, ("best",), options={"preset": "best"}),
     "unknown setting": BadInput(capture_files, "option-invalid", 422, ("colour",), options={"set": "colour=1"}),
+    "unknown format": BadInput(capture_files, "unknown-format", 422, ("fbx",), options={"formats": "web,fbx"}),
     "bad seed": BadInput(capture_files, "option-invalid", 422, ("seed",), options={"seed": "many"}),
 }

@@ -57,7 +57,7 @@ def test_bad_database_url_is_status_2(capsys: pytest.CaptureFixture[str]) -> Non
     assert "error [option-invalid]: " in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", ["convert", "serve", "worker", "sample", "demo"])
+@pytest.mark.parametrize("command", ["convert", "export", "serve", "worker", "sample", "demo"])
 def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:
         main([command, "--help"])

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from core.errors import OptionInvalid, UnknownPreset
+from service.errors import UnknownFormat
 from service.options import Options
 
 
@@ -21,11 +22,14 @@ def test_words_become_values() -> None:
     assert (options.scene_kind, options.skip_missing) == ("auto", False)
     chosen = Options.from_text({"scene_kind": "forward", "skip_missing": "true"})
     assert (chosen.scene_kind, chosen.skip_missing) == ("forward", True)
+    assert Options.from_text({}).formats == ("glb",)
+    assert Options.from_text({"formats": "usd, web"}).formats == ("glb", "web", "usd")
 
 
 def test_options_survive_json() -> None:
     options = Options.from_text(
-        {"preset": "draft", "background": "black", "scene_kind": "object", "skip_missing": "1"}, ["cells=32"]
+        {"preset": "draft", "background": "black", "scene_kind": "object", "skip_missing": "1", "formats": "all"},
+        ["cells=32"],
     )
     assert Options.from_json(json.loads(json.dumps(options.as_json()))) == options
 
@@ -48,6 +52,12 @@ def test_options_survive_json() -> None:
 def test_bad_word_is_refused(words: dict[str, str]) -> None:
     with pytest.raises(OptionInvalid):
         Options.from_text(words)
+
+
+@pytest.mark.parametrize("formats", ["fbx", "web,fbx", ",", "All"])
+def test_unknown_format_is_refused(formats: str) -> None:
+    with pytest.raises(UnknownFormat):
+        Options.from_text({"formats": formats})
 
 
 def test_unknown_preset_is_refused() -> None:

@@ -51,6 +51,21 @@ def test_job_of_a_killed_worker_goes_on_from_its_checkpoint_when_the_worker_is_b
         assert service.client.post(f"/jobs/{job_id}/cancel").json()["state"] == "cancelled"
 
 
+def test_export_of_a_killed_worker_is_done_when_the_worker_is_back(service: RunningService) -> None:
+    with Worker(service.settings) as worker:
+        job_id = service.post(name="quick then slow")
+        service.wait(job_id)
+        assert service.client.post(f"/jobs/{job_id}/exports", json={"formats": ["web"]}).status_code == 202
+        wait_until(lambda: len(starts(service, job_id)) == 2)
+        worker.kill()
+    wait_until(lambda: not is_alive(starts(service, job_id)[1][0]), 5)
+    assert service.job(job_id)["export"]["state"] == "running"
+    with Worker(service.settings):
+        wait_until(lambda: len(starts(service, job_id)) == 3)
+        job = service.client.post(f"/jobs/{job_id}/cancel").json()
+    assert (job["state"], job["export"]["state"]) == ("succeeded", "cancelled")
+
+
 def test_stopped_worker_leaves_its_job_to_be_gone_on_with(service: RunningService) -> None:
     job_id = service.post(name="slow")
     with Worker(service.settings) as worker:

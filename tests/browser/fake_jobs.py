@@ -7,6 +7,10 @@ from typing import Any
 from tests.browser.site import Answer
 
 JSON = "application/json"
+FORMATS = [
+    {"name": name, "file": file, "text": f"the {name} form", "opens_in": "a viewer"}
+    for name, file in (("glb", "scene.glb"), ("web", "scene.web.glb"), ("usd", "scene.usd.zip"))
+]
 
 
 @dataclass
@@ -32,6 +36,8 @@ class FakeJobs:
     uploads: list[bytes] = field(default_factory=list)
 
     def __call__(self, method: str, path: str, body: bytes) -> Answer | None:
+        if path == "/formats":
+            return _json(200, {"formats": FORMATS})
         if not path.startswith("/jobs"):
             return None
         if method != "GET":
@@ -50,8 +56,11 @@ class FakeJobs:
             return 200, "image/png", self.captures[job_id]
         job = next((job for job in self.jobs if job["id"] == job_id), None)
         if rest == "cancel" and job:
-            job["state"] = "cancelled"
-        return _json(200, job) if job and rest in ("", "cancel") else _json(404, {"code": "job-not-found"})
+            job["state"] = "cancelled" if job["export"] is None else job["state"]
+            job["export"] = job["export"] and job["export"] | {"state": "cancelled"}
+        if rest == "exports" and job:
+            job["export"] = {"state": "queued", "formats": json.loads(body)["formats"], "stage": None, "fraction": 0.0}
+        return _json(200, job) if job and rest in ("", "cancel", "exports") else _json(404, {"code": "job-not-found"})
 
     def _create(self, body: bytes) -> Answer:
         self.uploads.append(body)
@@ -80,6 +89,8 @@ def fake_job(job_id: str, state: str, **changes: Any) -> dict[str, Any]:
         "capture": None,
         "problem": None,
         "artifacts": [],
+        "formats": {},
+        "export": None,
         **changes,
     }
 

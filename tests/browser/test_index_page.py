@@ -124,7 +124,7 @@ def test_running_job_shows_stage_progress_psnr_and_preview(
     page.goto(site.url)
     card = page.locator(".job")
     expect(card.locator(".job-stage")).to_have_text("Training shape and appearance · 42 % · 27.18 dB")
-    expect(card.locator("progress")).to_have_js_property("value", 0.42)
+    expect(card.locator(".job-progress progress")).to_have_js_property("value", 0.42)
     expect(card.get_by_role("img", name="Preview of Teapot")).to_be_visible()
 
 
@@ -153,8 +153,68 @@ def test_ready_job_links_to_viewer_and_file(page: Page, site: Site, api: FakeJob
     page.goto(site.url)
     expect(page.locator(".job-facts")).to_contain_text("31.23 dB · 12.3 MB")
     expect(page.get_by_role("link", name="View in 3D")).to_have_attribute("href", f"{site.url}/viewer.html?job=a1")
-    link = page.get_by_role("link", name="Download")
+    link = page.locator("[data-action=download]")
     expect(link).to_have_attribute("href", f"{site.url}/jobs/a1/artifacts/scene.glb")
+
+
+def finished_job(**changes: object) -> dict[str, object]:
+    """A job with one of the three formats, one that could not be made, and one that was not asked for."""
+    names = {"scene.glb": 12_345_678, "report.json": 900}
+    artifacts = [{"name": name, "bytes": size, "url": f"/jobs/a1/artifacts/{name}"} for name, size in names.items()]
+    rows = {
+        "glb": {"file": "scene.glb", "bytes": 12_345_678, "psnr": 31.234, "note": "", "problem": ""},
+        "usd": {
+            "file": "scene.usd.zip",
+            "bytes": None,
+            "psnr": None,
+            "note": "",
+            "problem": "scene-invalid: <b>no</b>",
+        },
+    }
+    return fake_job("a1", "succeeded", name="Vase", artifacts=artifacts, formats=rows, **changes)
+
+
+def test_files_of_a_job_are_listed_with_size_quality_and_what_opens_them(page: Page, site: Site, api: FakeJobs) -> None:
+    api.jobs = [finished_job()]
+    page.goto(site.url)
+    files = page.locator(".job-files")
+    expect(files.locator("summary")).to_have_text("Files: 1 of 3 formats, 12.3 MB")
+    files.locator("summary").click()
+    row = files.locator("[data-format=glb]")
+    expect(row).to_contain_text("the glb form. Opens in: a viewer")
+    expect(row).to_contain_text("12.3 MB")
+    expect(row).to_contain_text("31.23 dB")
+    link = row.get_by_role("link", name="scene.glb")
+    expect(link).to_have_attribute("href", f"{site.url}/jobs/a1/artifacts/scene.glb")
+    expect(link).to_have_attribute("download", "Vase.glb")
+    expect(files.locator("[data-format=usd] .file-problem")).to_have_text("scene-invalid: <b>no</b>")
+    expect(files.get_by_role("link", name="report.json")).to_be_visible()
+
+
+def test_missing_format_is_made_on_request(page: Page, site: Site, api: FakeJobs) -> None:
+    api.jobs = [finished_job()]
+    page.goto(site.url)
+    files = page.locator(".job-files")
+    files.locator("summary").click()
+    files.get_by_role("button", name="Make: scene.web.glb").click()
+    expect(files.locator(".export-stage")).to_have_text("Waiting · 0 %")
+    assert api.jobs[0]["export"]["formats"] == ["web"]
+    expect(files.get_by_role("button", name="Try again: scene.usd.zip")).to_be_disabled()
+    api.jobs[0]["export"] |= {"state": "running", "stage": "export web", "fraction": 0.42}
+    expect(files.locator(".export-stage")).to_have_text("Writing scene.web.glb · 42 %")
+    files.get_by_role("button", name="Stop").click()
+    expect(files.locator(".export-progress")).to_be_hidden()
+    files.get_by_role("button", name="Make all the others").click()
+    expect(files.locator(".export-stage")).to_be_visible()
+    assert api.jobs[0]["export"]["formats"] == ["web", "usd"]
+    assert api.requests == [("POST", "/jobs/a1/exports"), ("POST", "/jobs/a1/cancel"), ("POST", "/jobs/a1/exports")]
+
+
+def test_export_that_failed_says_why(page: Page, site: Site, api: FakeJobs) -> None:
+    api.jobs = [finished_job(export={"state": "failed", "formats": ["web"], "problem": PROBLEM})]
+    page.goto(site.url)
+    page.locator(".job-files summary").click()
+    expect(page.locator(".export-problem strong")).to_contain_text("must be a finite number")
 
 
 def test_failed_job_says_why(page: Page, site: Site, api: FakeJobs) -> None:
@@ -182,6 +242,7 @@ def test_page_fits_a_phone(phone: Page, site: Site, api: FakeJobs) -> None:
     api.jobs = [fake_job("a1", "failed", name=long_name, problem=PROBLEM), fake_job("a2", "succeeded", name=long_name)]
     phone.goto(site.url)
     expect(phone.locator(".job")).to_have_count(2)
+    phone.locator(".job-files:visible summary").click()
     assert phone.evaluate("document.documentElement.scrollWidth") <= 390
     for button in phone.locator("a.button:visible, button:visible, label.button:visible").all():
         box = button.bounding_box()

@@ -36,6 +36,14 @@ export async function listJobs() {
   return (await request(jobsUrl)).jobs;
 }
 
+export async function listFormats() {
+  return (await request(new URL("formats", root).href)).formats;
+}
+
+/** @param {string[]} formats names of formats */
+export const exportJob = (id, formats) =>
+  request(`${jobUrl(id)}/exports`, { method: "POST", body: JSON.stringify({ formats }) });
+
 export const getJob = (id) => request(jobUrl(id));
 export const cancelJob = (id) => request(`${jobUrl(id)}/cancel`, { method: "POST" });
 export const deleteJob = (id) => request(jobUrl(id), { method: "DELETE" });

@@ -2,6 +2,7 @@
 
 import { artifactUrl, viewerUrl } from "./api.js";
 import { formatAgo, formatBytes, formatPsnr, plural } from "./format.js";
+import { JobFiles, exportStageName } from "./job-files.js";
 import { nameOfJob } from "./job-name.js";
 import { showProblem } from "./notice.js";
 
@@ -34,11 +35,19 @@ export class JobCard {
   #job;
   #shownPreview = "";
   #shownReport = "";
+  #formats;
+  #files;
 
-  /** @param {{onCancel: (id: string) => void, onDelete: (id: string) => void}} actions */
-  constructor(job, actions) {
+  /**
+   * @param {{onCancel: (id) => void, onDelete: (id) => void, onExport: (id, names: string[]) => void}} actions
+   * @param {object[]} formats that the service can export to
+   */
+  constructor(job, actions, formats) {
+    this.#formats = formats;
     const template = document.getElementById("job-template");
     this.element = template.content.firstElementChild.cloneNode(true);
+    this.#files = new JobFiles(this.#find(".job-files"), formats, (names) => actions.onExport(job.id, names));
+    this.#on("stop-export", () => actions.onCancel(job.id));
     this.#on("cancel", () => actions.onCancel(job.id));
     this.#on("delete", () => this.#confirm(() => actions.onDelete(job.id)));
     const image = this.#find(".job-picture img");
@@ -62,6 +71,7 @@ export class JobCard {
     this.#showProgress();
     this.#showPicture();
     this.#showReport();
+    this.#files.show(job);
     this.#showActions();
   }
 
@@ -71,7 +81,8 @@ export class JobCard {
     const bar = this.#find("progress");
     bar.value = fraction ?? 0;
     bar.setAttribute("aria-label", `Progress of ${nameOfJob(this.#job)}`);
-    const parts = [STAGE_NAMES[stage] ?? stage ?? "Starting", `${Math.round(100 * (fraction ?? 0))} %`];
+    const doing = exportStageName(stage, this.#formats) ?? STAGE_NAMES[stage] ?? stage ?? "Starting";
+    const parts = [doing, `${Math.round(100 * (fraction ?? 0))} %`];
     if (typeof psnr === "number") parts.push(formatPsnr(psnr));
     this.#find(".job-stage").textContent = parts.join(" · ");
   }

@@ -1,12 +1,14 @@
 // The list of jobs: newest first, running ones live.
 
-import { cancelJob, deleteJob, listJobs } from "./api.js";
+import { cancelJob, deleteJob, exportJob, listFormats, listJobs } from "./api.js";
 import { formatCount } from "./format.js";
 import { JobCard } from "./job-card.js";
 import { followJob } from "./job-events.js";
+import { isExporting } from "./job-files.js";
 import { showProblem } from "./notice.js";
 
 const REFRESH_MS = 4000;
+const EXPORT_REFRESH_MS = 1000;
 // A browser opens six connections to a host over HTTP/1.1; the page needs some of them for itself.
 const MAX_FOLLOWED = 3;
 
@@ -16,7 +18,10 @@ export class JobList {
   #actions = {
     onCancel: (id) => this.#act(() => cancelJob(id)),
     onDelete: (id) => this.#act(() => deleteJob(id)),
+    onExport: (id, names) => this.#act(() => exportJob(id, names)),
   };
+  #formats = null;
+  #soon = 0;
   #element = document.getElementById("jobs");
   #offline = document.getElementById("jobs-offline");
 
@@ -28,6 +33,7 @@ export class JobList {
 
   async refresh() {
     try {
+      this.#formats ??= await listFormats();
       this.#show(await listJobs());
       showProblem(this.#offline, null);
     } catch (problem) {
@@ -43,13 +49,16 @@ export class JobList {
     document.getElementById("jobs-empty").hidden = jobs.length > 0;
     document.getElementById("jobs-count").textContent = jobs.length > 0 ? formatCount(jobs.length) : "";
     this.#follow();
+    // Exports take seconds, and have no events of their own.
+    clearTimeout(this.#soon);
+    if (jobs.some(isExporting)) this.#soon = setTimeout(() => document.hidden || this.refresh(), EXPORT_REFRESH_MS);
   }
 
   #place(job, index) {
     const card = this.#cards.get(job.id);
     // Events of a running job are fresher than the list.
     if (card) card.update(this.#followed.has(job.id) ? { ...job, ...progressOf(card.job, job) } : job);
-    else this.#cards.set(job.id, new JobCard(job, this.#actions));
+    else this.#cards.set(job.id, new JobCard(job, this.#actions, this.#formats));
     const { element } = this.#cards.get(job.id);
     if (this.#element.children[index] !== element) this.#element.insertBefore(element, this.#element.children[index]);
   }

@@ -19,6 +19,7 @@ from core.datasets import photos_without_poses, read_capture
 from core.posing.pose_photos import pose_photos
 from core.posing.posing import Posing
 from core.presets import Settings
+from core.scene_kind import OBJECT
 from service.artifacts import CAPTURE_JSON, CAPTURE_PICTURE
 from service.atomic import write_atomically
 from service.preview import png_bytes
@@ -62,7 +63,8 @@ class Preparation:
             capture = capture_of(source, self.photos, posing)
             form = ESTIMATED if posing else convention_of(source)
             pixels = sum(view.image_u8.shape[0] * view.image_u8.shape[1] for view in capture.train + capture.test)
-            report = report_of_capture(capture, form, expected(self.settings, pixels, self.device), posing)
+            expectation = expected(self.settings, pixels, self.device, surroundings=capture.kind.name != OBJECT)
+            report = report_of_capture(capture, form, expectation, posing)
             self._publish(report, png_bytes(coverage_picture(capture, report.photos)))
         return capture, report
 

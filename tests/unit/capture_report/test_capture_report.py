@@ -125,6 +125,7 @@ def test_expectation_grows_with_preset_and_shrinks_with_cores() -> None:
     assert high.seconds > 5 * draft.seconds
     assert high.glb_bytes > draft.glb_bytes
     assert expected(settings_for("draft"), 10**6, cores=8).seconds < draft.seconds
+    assert expected(settings_for("draft"), 10**6, cores=2, surroundings=True).seconds > draft.seconds
     assert expected(settings_for("draft"), 10**6, "cuda").seconds is None
     assert FACTOR > 1
 

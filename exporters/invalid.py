@@ -27,5 +27,7 @@ def only_asset_invalid(subject: str) -> Iterator[None]:
         raise
     except PolyfieldError as error:
         raise invalid(error.subject, error.rule, error.received) from error
+    except KeyError as error:
+        raise invalid(subject, "must follow its schema", f"no {error}"[:120]) from error
     except _OF_UNEXPECTED_STRUCTURE as error:
         raise invalid(subject, "must follow its schema", f"{type(error).__name__}: {error}"[:120]) from error

@@ -1,4 +1,4 @@
-"""The command line: `polyfield convert | serve | worker | sample | demo`.
+"""The command line: `polyfield convert | export | check | serve | worker | sample | demo`.
 
 Exit status: 0 done; 1 failed; 2 the input or an option cannot be used; 130 stopped with Ctrl-C.
 """
@@ -8,9 +8,9 @@ import sys
 from collections.abc import Sequence
 
 from core.errors import InputError, PolyfieldError
-from service.commands import convert, demo, sample, serve, worker
+from service.commands import check, convert, demo, export, sample, serve, worker
 
-COMMANDS = (convert, serve, worker, sample, demo)
+COMMANDS = (convert, export, check, serve, worker, sample, demo)
 INTERRUPTED = 130
 
 

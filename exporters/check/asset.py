@@ -9,16 +9,16 @@ from typing import Any
 from core.baked import ShaderNetwork, check_similarity
 from core.errors import AssetInvalid
 from exporters.check.compiler import Compiler
+from exporters.check.extensions import check_extensions
 from exporters.check.finding import Findings
 from exporters.check.page import check_page
+from exporters.check.placement import check_hierarchy
 from exporters.check.shaders import check_shaders
 from exporters.gltf import extension, reader
 from exporters.gltf.document import Document, chunks
 from exporters.images import image_size
 from exporters.invalid import invalid, only_asset_invalid
 from exporters.limits import MAX_PAGES, check_size
-
-GENERAL = (extension.NAME, "KHR_materials_unlit")
 
 
 def check_glb(data: bytes, compiler: Compiler | None = None) -> Findings:
@@ -69,7 +69,8 @@ def _check_padding(found: Findings, data: bytes) -> None:
 
 
 def _check_document(found: Findings, document: Document, compiler: Compiler | None) -> None:
-    found.attempt("extension", "glTF JSON", _check_extension_lists, found, document)
+    found.attempt("json", "asset", _check_version, document)
+    found.attempt("extension", "extension lists", check_extensions, found, document)
     found.attempt("container", "buffers", _check_buffer, found, document)
     root = found.attempt("extension", extension.NAME, reader.root_extension, document)
     if root is None:
@@ -77,6 +78,7 @@ def _check_document(found: Findings, document: Document, compiler: Compiler | No
     found.attempt("background", "background", _check_background, root)
     found.attempt("frame", "object node", _check_object_node, document)
     found.attempt("frame", "userFromObject", _check_user_frame, root)
+    found.attempt("frame", "nodes", check_hierarchy, found, document)
     found.attempt("view", "views", _check_views, document, root)
     network = found.attempt("network", "network", _network, root)
     if network is not None:
@@ -90,13 +92,10 @@ def _check_document(found: Findings, document: Document, compiler: Compiler | No
         found.attempt("mesh", f"page {number}", check_page, found, document, primitive, f"page {number}", network)
 
 
-def _check_extension_lists(found: Findings, document: Document) -> None:
-    used, required = (document.json.get(f"extensions{kind}", []) for kind in ("Used", "Required"))
-    for name in GENERAL:
-        if name not in used:
-            found.error("extension", "extensionsUsed", f"must list {name}")
-        if name in required:
-            found.error("extension", "extensionsRequired", f"must not list {name}: other viewers would refuse the file")
+def _check_version(document: Document) -> None:
+    version = document.json["asset"]["version"]
+    if version != "2.0":
+        raise invalid("asset", "must have version 2.0", str(version)[:20])
 
 
 def _check_buffer(found: Findings, document: Document) -> None:

@@ -31,21 +31,23 @@ def check_features(
     found: Findings, features_u8: np.ndarray, color: np.ndarray, network: ShaderNetwork, name: str
 ) -> None:
     """Adds a finding if a page's features [h, w, 8] do not show its fallback colours [h, w, 4] (both uint8)."""
-    rows, columns = np.nonzero(color[..., 3] > 0)
-    some = np.random.default_rng(0).permutation(len(rows))[:TEXELS]
-    if len(some) == 0:
+    shown = color[..., 3] > 0
+    opaque = np.flatnonzero(shown)
+    if len(opaque) == 0:
         return
-    features, colors = features_u8[rows[some], columns[some]], color[rows[some], columns[some], :3] / 255.0
-    tolerance = TOLERANCE + (_step_of(color[rows, columns, :3]) - 1) / 2 / 255
+    some = np.random.default_rng(0).choice(opaque, min(TEXELS, len(opaque)), replace=False)
+    rows, columns = np.unravel_index(some, shown.shape)
+    features, colors = features_u8[rows, columns], color[rows, columns, :3] / 255.0
+    tolerance = TOLERANCE + (_step_of(color[shown, :3]) - 1) / 2 / 255
+    outside = _outside_share(features, colors, network, tolerance)
+    if outside <= OUTSIDE_SHARE:
+        return
     premultiplied = [half for half in (0, 1) if _is_premultiplied(features[:, 4 * half : 4 * half + 4])]
     if premultiplied:
         which = " and ".join(("features 0-3", "features 4-7")[half] for half in premultiplied)
         found.error(
             "feature", name, f"must have straight alpha, but {which} are premultiplied: no colour exceeds alpha"
         )
-        return
-    outside = _outside_share(features, colors, network, tolerance)
-    if outside <= OUTSIDE_SHARE:
         return
     message = f"must show the fallback's colours, but {100 * outside:.0f} % of the texels cannot"
     found.error("feature", name, f"{message}: {_explanation(features, colors, network, tolerance, outside)}")

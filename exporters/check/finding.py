@@ -28,7 +28,13 @@ class Finding:
     message: str
 
     def __str__(self) -> str:
-        return f"{self.severity} [{self.code}] {self.subject}: {self.message}"
+        """One line, whatever the file has put into it."""
+        return _printable(f"{self.severity} [{self.code}] {self.subject}: {self.message}")
+
+
+def _printable(text: str) -> str:
+    """Line ends, escape sequences and halves of characters as Python would write them."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 class Findings(list[Finding]):

@@ -9,7 +9,8 @@ from core.conventions import is_opaque
 from exporters.check.features import check_features
 from exporters.check.finding import Findings
 from exporters.check.png_chunks import COLOR_CHUNKS, chunk_names
-from exporters.gltf import reader
+from exporters.check.storage import check_alignment, check_image_kind
+from exporters.gltf import extension, reader
 from exporters.gltf.document import Document
 from exporters.gltf.quantization import steps_of
 from exporters.images import decode_image
@@ -31,12 +32,14 @@ def check_page(
     found.attempt("fallback", f"{name}'s material", _check_fallback, found, document, primitive, name)
     mesh = found.attempt("mesh", f"{name}'s mesh", reader.mesh_of, document, primitive)
     if mesh is not None:
+        found.attempt("mesh", f"{name}'s mesh", check_alignment, found, document, primitive, name)
         found.attempt("mesh", f"{name}'s mesh", _check_mesh, found, document, primitive, name, *mesh)
     files = found.attempt("texture", f"{name}'s textures", reader.page_files, document, primitive)
     if files is None:
         return
     found.attempt("texture", f"{name}'s textures", _check_sampling, found, document, primitive, name)
-    for file, label in zip(files, _NAMES, strict=True):
+    for texture, file, label in zip(_textures(document, primitive), files, _NAMES, strict=True):
+        found.attempt("texture", name, check_image_kind, found, document, texture, file, f"{name}, {label}")
         managed = COLOR_CHUNKS & set(chunk_names(file))
         if managed and label != _NAMES[2]:
             found.error("texture", f"{name}, {label}", f"must not say how to convert colours ({', '.join(managed)})")
@@ -97,13 +100,17 @@ def _check_mesh(
 
 
 def _check_sampling(found: Findings, document: Document, primitive: dict[str, Any], name: str) -> None:
+    texture = document.item("textures", _textures(document, primitive)[2])
+    sampler = document.item("samplers", texture["sampler"]) if "sampler" in texture else {}
+    if (sampler.get("magFilter"), sampler.get("minFilter")) != (_NEAREST, _NEAREST):
+        found.warning("texture", f"{name}, {_NAMES[2]}", "should be sampled nearest: patches bleed into each other")
+
+
+def _textures(document: Document, primitive: dict[str, Any]) -> tuple[int, int, int]:
+    """Indices of features 0-3, features 4-7 and the fallback's colour."""
+    first, second = (texture["index"] for texture in primitive["extensions"][extension.NAME]["featureTextures"])
     material = document.item("materials", primitive.get("material"))
-    textures = [material["pbrMetallicRoughness"]["baseColorTexture"]["index"]]
-    for index in textures:
-        texture = document.item("textures", index)
-        sampler = document.item("samplers", texture["sampler"]) if "sampler" in texture else {}
-        if (sampler.get("magFilter"), sampler.get("minFilter")) != (_NEAREST, _NEAREST):
-            found.warning("texture", f"{name}, {_NAMES[2]}", "should be sampled nearest: patches bleed into each other")
+    return first, second, material["pbrMetallicRoughness"]["baseColorTexture"]["index"]
 
 
 def _check_holes(found: Findings, features_u8: np.ndarray, color: np.ndarray, name: str) -> None:

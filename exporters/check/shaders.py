@@ -31,7 +31,7 @@ def check_shaders(found: Findings, json: dict[str, Any], network: ShaderNetwork,
         if not broken and shaders[dialect] != shader_sources(network, dialect):
             found.warning("shader", dialect, "is not the text that Polyfield makes of these weights: may show others")
     if shaders and compiler is None:
-        found.append(Finding("note", "shader", "shaders", "were not compiled: there is no OpenGL here"))
+        found.append(Finding("note", "shader", "shaders", "were not compiled: moderngl or OpenGL is missing here"))
 
 
 def _check_dialect(found: Findings, dialect: Dialect, sources: ShaderSources, compiler: Compiler | None) -> bool:

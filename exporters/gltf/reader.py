@@ -153,6 +153,8 @@ def mesh_of(document: Document, primitive: dict[str, Any]) -> tuple[np.ndarray, 
         raise invalid("primitive", "must be of triangles", f"mode {str(primitive['mode'])[:20]}")
     attributes = primitive["attributes"]
     indices = document.accessor(primitive["indices"], "SCALAR", _INDEX)
+    if len(indices) % 3:
+        raise invalid("triangles", "must have three indices each", f"{len(indices)} indices")
     positions = document.accessor(attributes["POSITION"], "VEC3", _POSITION)
     return (
         positions_of(positions) if positions.dtype.kind == "i" else positions.astype(np.float32),

@@ -4,6 +4,7 @@ import copy
 import io
 import json
 import struct
+import tracemalloc
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
@@ -39,6 +40,13 @@ def trained_like(scene: BakedScene) -> BakedScene:
 
 GOOD = write_glb(trained_like(tiny_scene()))["scene.glb"]
 SMALL = write_glb(random_scene(np.random.default_rng(5), 4))["scene.glb"]
+
+
+def gentle(scene: BakedScene) -> BakedScene:
+    """The scene with a network whose colours vary as little with its inputs as trained ones do."""
+    network = random_network(np.random.default_rng(1), gain=0.5)
+    pages = tuple(replace(page, colors_u8=mean_colors(network, page.features_u8)) for page in scene.pages)
+    return replace(scene, pages=pages, network=network)
 
 
 def accepts_all(vertex: str, fragment: str) -> str:
@@ -142,6 +150,16 @@ def gamma(pixels: np.ndarray) -> np.ndarray:
     return np.where(pixels > 0, np.maximum(curved, 1), 0).astype(np.uint8)  # holes stay where they are
 
 
+def with_width(width: int) -> Callable[[bytes], bytes]:
+    """A PNG header of another width, its checksum correct."""
+
+    def damage(png: bytes) -> bytes:
+        header = b"IHDR" + struct.pack(">I", width) + png[20:29]
+        return png[:12] + header + struct.pack(">I", zlib.crc32(header)) + png[33:]
+
+    return damage
+
+
 def without_binary(glb: bytes) -> bytes:
     (length,) = struct.unpack("<I", glb[12:16])
     return glb[:8] + struct.pack("<I", 20 + length) + glb[12 : 20 + length]
@@ -182,8 +200,12 @@ FAULTS: dict[str, tuple[Callable[[bytes], bytes], str, str]] = {
         "container",
         "must lie within",
     ),
+    "a header of 2 GiB": (lambda glb: glb[:8] + struct.pack("<I", 2**31) + glb[12:], "container", "2147483648"),
+    "a chunk of 2 GiB": (lambda glb: glb[:12] + struct.pack("<I", 2**31) + glb[16:], "container", "2147483648"),
     "no binary chunk": (without_binary, "container", "binary chunk"),
     "buffer longer than it is": (in_json(lambda d: d["buffers"][0].update(byteLength=10**9)), "container", "states"),
+    "glTF 1 in JSON": (in_json(lambda d: d["asset"].update(version="1.0")), "json", "2.0"),
+    "no asset": (in_json(lambda d: d.pop("asset")), "json", "asset"),
     "JSON broken": (lambda glb: glb.replace(b'"asset"', b'"asset,', 1), "json", "JSON"),
     "weights NaN": (
         in_json(lambda d: network(d)["layers"][1]["weights"][2].__setitem__(3, float("nan"))),
@@ -199,6 +221,11 @@ FAULTS: dict[str, tuple[Callable[[bytes], bytes], str, str]] = {
     "extension missing": (in_json(lambda d: d.pop("extensions")), "extension", NAME),
     "extension not listed": (in_json(lambda d: d["extensionsUsed"].remove(NAME)), "extension", "must list"),
     "extension required": (in_json(lambda d: d.update(extensionsRequired=[NAME])), "extension", "must not list"),
+    "extension of others required": (
+        in_json(lambda d: d.update(extensionsRequired=["KHR_draco_mesh_compression"])), "extension", "draco",
+    ),
+    "mesh on no node": (in_json(lambda d: d["nodes"][0]["children"].remove(1)), "frame", "meshes[0]"),
+    "node below itself": (in_json(lambda d: d["nodes"][1].update(children=[0])), "frame", "several"),
     "background out of range": (in_json(lambda d: root(d).update(background=[2, 0, 0])), "background", "[0, 1]"),
     "object stretched": (in_json(lambda d: d["nodes"][0].update(scale=[1, 2, 1])), "frame", "one scale"),
     "user's frame sheared": (
@@ -213,6 +240,10 @@ FAULTS: dict[str, tuple[Callable[[bytes], bytes], str, str]] = {
     "start at no view": (in_json(lambda d: root(d).update(startView=9)), "view", "startView"),
     "missing image": (in_json(lambda d: d["images"].pop()), "texture", "images"),
     "image elsewhere": (in_json(lambda d: d["images"].__setitem__(0, {"uri": "x.png"})), "texture", "x.png"),
+    "image of another kind than stated": (
+        in_json(lambda d: d["images"][0].update(mimeType="image/webp")), "texture", "image/png",
+    ),
+    "image of 100,000 px": (with_png(0, with_width(100_000)), "texture", "100000"),
     "truncated image": (with_png(0, lambda png: png[: len(png) // 2]), "texture", "intact"),
     "image that is none": (with_png(1, lambda png: b"GIF89a" + png[6:]), "texture", "PNG"),
     "image without alpha": (with_png(0, as_other_png("RGB")), "texture", "RGBA"),
@@ -231,6 +262,13 @@ FAULTS: dict[str, tuple[Callable[[bytes], bytes], str, str]] = {
     "bounds wrong": (in_json(lambda d: d["accessors"][0].update(max=[9, 9, 9])), "mesh", "max"),
     "texture coordinate outside": (in_array(1, lambda a: a.__setitem__(0, 1.5)), "mesh", "within [0, 1]"),
     "accessor beyond the buffer": (in_json(lambda d: d["accessors"][0].update(count=10**6)), "mesh", "bytes"),
+    "no texture coordinates": (in_json(lambda d: primitive(d)["attributes"].pop("TEXCOORD_0")), "mesh", "TEXCOORD_0"),
+    "vertices claimed": (in_json(lambda d: d["accessors"][0].update(count=2**31)), "mesh", "bytes"),
+    "accessor that is not aligned": (
+        in_json(lambda d: d["accessors"][0].update(byteOffset=2, count=d["accessors"][0]["count"] - 1)),
+        "mesh", "multiple of 4",
+    ),
+    "half a triangle": (in_json(lambda d: d["accessors"][2].update(count=4)), "mesh", "three indices"),
     "no triangles": (in_json(lambda d: d["accessors"][2].update(count=0)), "mesh", "triangles"),
     "triangle strip": (in_json(lambda d: primitive(d).update(mode=5)), "mesh", "triangles"),
     "mesh folded flat": (in_array(0, lambda a: a.__setitem__(slice(None), 1.0)), "mesh", "area"),
@@ -306,6 +344,31 @@ def test_gltf_with_files_is_checked_alike(scene: BakedScene) -> None:
     assert check_gltf({}, accepts_all)[0].code == "container"
     findings = check_gltf({name: data for name, data in files.items() if name != "page0.color.png"}, accepts_all)
     assert any(finding.code == "texture" and "page0.color.png" in str(finding) for finding in findings)
+
+
+def test_finding_is_one_line_whatever_the_file_has_put_into_it() -> None:
+    finding = Finding("error", "texture", "a\nb\x1b[2J", "must be \ud800\u202e é")
+    assert str(finding) == "error [texture] a\\nb\\x1b[2J: must be \\ud800\\u202e é"
+
+
+CLAIMS = (
+    "a header of 2 GiB",
+    "a chunk of 2 GiB",
+    "image of 100,000 px",
+    "vertices claimed",
+    "buffer longer than it is",
+)
+
+
+@pytest.mark.parametrize("name", CLAIMS)
+def test_no_memory_is_taken_on_a_files_word(name: str) -> None:
+    damaged = FAULTS[name][0](SMALL)
+    found_in(damaged)  # what is loaded once
+    tracemalloc.start()
+    found_in(damaged)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 50_000_000  # what the check itself takes for 48 directions for each of 2048 texels; claimed is 1 GB
 
 
 @settings(max_examples=200, deadline=None)

@@ -23,7 +23,6 @@ from service.commands.progress_bar import ProgressBar
 from service.report import Report
 
 OUT = Path("out") / "demo"
-ARTIFACTS = ("scene.glb", "preview.png", "report.json", "capture.json", "capture.png")
 START_TIMEOUT_S = 60.0
 STOP_TIMEOUT_S = 15.0
 
@@ -151,10 +150,10 @@ def _events(lines: Iterator[str]) -> Iterator[tuple[str, Any]]:
 
 def _download(client: httpx.Client, job_id: str, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    for name in ARTIFACTS:
-        answer = client.get(f"/jobs/{job_id}/artifacts/{name}")
+    for artifact in client.get(f"/jobs/{job_id}").raise_for_status().json()["artifacts"]:
+        answer = client.get(artifact["url"])
         answer.raise_for_status()
-        (folder / name).write_bytes(answer.content)
+        (folder / artifact["name"]).write_bytes(answer.content)
 
 
 def _refused(problem: dict[str, Any]) -> DemoFailed:

@@ -155,8 +155,8 @@ def _write_html(source: Source) -> bytes:
 
 def _read_html(data: bytes) -> BakedScene:
     match = _WITHIN_HTML.search(data)
-    if not match:
-        raise AssetInvalid("viewer.html", "must hold a scene", "none")
+    if not match or not data.endswith(b"</html>\n"):
+        raise AssetInvalid("viewer.html", "must be whole and hold a scene", f"{len(data)} bytes")
     return _read_glb(base64.b64decode(match[1]))
 
 

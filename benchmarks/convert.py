@@ -22,7 +22,7 @@ from core.evaluation import comparison_picture
 from exporters.gltf import read_glb
 from service.commands.common import add_options, options_of
 from service.commands.progress_bar import ProgressBar
-from service.conversion import SCENE, convert
+from service.conversion import POSING, SCENE, convert
 from service.options import Options
 from service.report import Report
 
@@ -84,7 +84,8 @@ def _row(
 
 
 def _comparison(arguments: argparse.Namespace, options: Options, out: Path, device: str) -> Image.Image:
-    capture = read_photos(arguments.capture, photo_options_in(options))
+    posed = out / POSING  # of photos that came without poses
+    capture = read_photos(posed if posed.is_dir() else arguments.capture, photo_options_in(options))
     views = capture.test or capture.train
     view = views[arguments.view % len(views)]
     picture = comparison_picture(read_glb((out / SCENE).read_bytes()), view, device=device)

@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 from core.baked import ShaderNetwork, check_similarity
@@ -89,7 +90,9 @@ def _check_document(found: Findings, document: Document, compiler: Compiler | No
     if len(found) > before:
         return
     for number, primitive in enumerate(primitives or []):
-        found.attempt("mesh", f"page {number}", check_page, found, document, primitive, f"page {number}", network)
+        name, of_page = f"page {number}", Findings()
+        of_page.attempt("mesh", name, check_page, of_page, document, primitive, name, network)
+        found += [one if name in one.subject else replace(one, subject=f"{name}, {one.subject}") for one in of_page]
 
 
 def _check_version(document: Document) -> None:

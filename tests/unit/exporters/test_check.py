@@ -302,6 +302,11 @@ def test_fault_is_named(damage: Callable[[bytes], bytes], code: str, words: str)
     assert len(findings) <= 4, findings  # the fault, not a flood
 
 
+def test_fault_of_a_page_names_the_page() -> None:
+    (finding,) = found_in(FAULTS["index out of range"][0](GOOD))
+    assert str(finding) == "error [mesh] page 0, triangles: must index the 120 vertices, but got index 60000"
+
+
 def test_every_fault_of_a_file_is_found() -> None:
     names = (
         "background out of range",

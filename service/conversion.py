@@ -21,6 +21,7 @@ from service.capture_source import opened_capture
 from service.formats import DEFAULT, FORMATS, FormatRow
 from service.formats.exporting import NO_VIEWS, exported
 from service.formats.measure import BEST_PSNR, Measure
+from service.formats.provenance import of_conversion
 from service.formats.source import Source
 from service.prepared import Preparation, ReportCallback
 from service.preview import png_bytes, preview
@@ -98,7 +99,9 @@ def convert(
     )
     stages.add(trained.seconds)
     with stages.stage("export", EXPORT):
-        asset, size = _export(trained.scene, out_dir, title or capture_path.resolve().stem)
+        called = title or capture_path.resolve().stem
+        known = of_conversion(called, "" if title else capture_path.resolve().name, {**asdict(settings), "seed": seed})
+        asset, size = _export(Source(trained.scene, called, provenance=known), out_dir)
     scene, trained = asset.scene, replace(trained, scene=asset.scene)
     with stages.stage("measure", MEASURE):
         evaluation = evaluate(scene, capture.test, device=device, progress=stages.within(MEASURE))
@@ -134,15 +137,15 @@ def convert(
     return report
 
 
-def _export(scene: BakedScene, folder: Path, title: str) -> tuple[Source, int]:
-    """Writes the asset; returns what the file holds, and its size."""
+def _export(source: Source, folder: Path) -> tuple[Source, int]:
+    """Writes the asset; returns what the file holds, to export to other formats, and its size."""
     folder.mkdir(parents=True, exist_ok=True)
     _remove_earlier(folder)
     form = FORMATS["glb"]
-    size = _write(folder, SCENE, form.write(Source(scene, title)))
+    size = _write(folder, SCENE, form.write(source))
     held = form.read((folder / SCENE).read_bytes())
     assert isinstance(held, BakedScene)
-    return Source(held, title, folder / SCENE), size
+    return Source(held, source.title, folder / SCENE, source.provenance), size
 
 
 def _remove_earlier(folder: Path) -> None:

@@ -11,6 +11,7 @@ from core.progress import ProgressCallback, ignore_progress
 from service.atomic import write_atomically
 from service.formats import DEFAULT, FormatRow
 from service.formats.exporting import exported
+from service.formats.provenance import in_glb
 from service.formats.source import Source
 from service.held_out import measure_on
 from service.report import Report, json_bytes
@@ -65,7 +66,9 @@ def export(
         photos = photos_as_reported(beside / REPORT) if photos is None else photos
         measure = measure_on(capture, photos, posing_dir or beside / POSING, device, stages.posing())
     out_dir.mkdir(parents=True, exist_ok=True)
-    source = Source(scene, title or scene_path.resolve().stem, scene_path)
+    known = in_glb(scene_path.read_bytes()) if scene_path.suffix.lower() == ".glb" else None
+    called = title or (known and known.title) or scene_path.resolve().stem
+    source = Source(scene, called, scene_path, known)
     rows: dict[str, FormatRow] = {}
     for name, row in exported(source, names, out_dir, measure, lambda name: stages.within_format(names.index(name))):
         rows[name] = row

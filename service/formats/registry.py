@@ -50,7 +50,7 @@ class Format:
 def _write_glb(source: Source) -> bytes:
     from exporters.gltf import write_glb
 
-    return _only(write_glb(source.scene))
+    return _only(write_glb(source.scene, source.provenance))
 
 
 def _read_glb(data: bytes) -> BakedScene:
@@ -62,13 +62,13 @@ def _read_glb(data: bytes) -> BakedScene:
 def _write_lq(source: Source) -> bytes:
     from exporters.gltf import write_lq_glb
 
-    return _only(write_lq_glb(source.scene))
+    return _only(write_lq_glb(source.scene, source.provenance))
 
 
 def _write_gltf(source: Source) -> bytes:
     from exporters.gltf import write_gltf
 
-    return zipped(write_gltf(source.scene))
+    return zipped(write_gltf(source.scene, source.provenance))
 
 
 def _read_gltf(data: bytes) -> BakedScene:

@@ -2,8 +2,12 @@
 
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from core.baked import BakedScene
+
+if TYPE_CHECKING:
+    from exporters.gltf import Provenance
 
 
 class Source:
@@ -13,10 +17,17 @@ class Source:
         scene: what to export.
         title: what people call it; part of the formats that have a place for it.
         file: that the scene was read from. It is never written to.
+        provenance: where it comes from; part of glTF.
     """
 
-    def __init__(self, scene: BakedScene, title: str = "Scene", file: Path | None = None) -> None:
-        self.scene, self.title, self._file = scene, title, file
+    def __init__(
+        self,
+        scene: BakedScene,
+        title: str = "Scene",
+        file: Path | None = None,
+        provenance: "Provenance | None" = None,
+    ) -> None:
+        self.scene, self.title, self.provenance, self._file = scene, title, provenance, file
 
     def is_file(self, path: Path) -> bool:
         """Whether the scene was read from there."""
@@ -27,5 +38,5 @@ class Source:
         """scene.web.glb: a format of its own, and what the viewer's bundles hold."""
         from exporters.gltf import write_web_glb
 
-        (data,) = write_web_glb(self.scene).values()
+        (data,) = write_web_glb(self.scene, self.provenance).values()
         return data

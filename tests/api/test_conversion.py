@@ -14,6 +14,7 @@ from exporters.viewer.bundle import VIEWER
 from service.cli import main
 from service.formats import FORMATS
 from service.formats.exporting import NO_VIEWS
+from service.formats.provenance import in_glb
 from service.report import Report
 from service.settings import ServiceSettings
 from tests.api.captures import capture_files, write_files, zipped
@@ -81,6 +82,14 @@ def test_scene_is_exported_again_without_training(
         assert row["psnr"] == pytest.approx(report.formats[name].psnr, abs=1e-6)
         assert row["bytes"] == report.formats[name].bytes
     assert "scene.obj.zip" in capsys.readouterr().out
+
+
+def test_where_the_scene_comes_from_is_kept_in_every_gltf(out: Path, capture: Path) -> None:
+    known = in_glb((out / "scene.glb").read_bytes())
+    assert known is not None
+    assert (known.title, known.source) == (capture.stem, capture.name)
+    assert known.settings["cells"] == TINY["cells"]
+    assert in_glb((out / "scene.web.glb").read_bytes()) == in_glb((out / "scene.lq.glb").read_bytes()) == known
 
 
 def test_export_beside_its_scene_brings_the_report_up_to_date(capture: Path, out: Path, tmp_path: Path) -> None:

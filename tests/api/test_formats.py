@@ -14,12 +14,14 @@ from core.errors import AssetInvalid, SceneInvalid
 from core.progress import Progress
 from core.render.composite import over, quantised
 from core.render.raster import Rasteriser
+from exporters.gltf import Provenance
 from exporters.viewer.bundle import VIEWER
 from service.errors import UnknownFormat
 from service.formats import FORMATS, formats_of
 from service.formats.colours import Coloured, ColourRenderer, scene_of_colours
 from service.formats.exporting import NO_VIEWS, exported
 from service.formats.measure import BEST_PSNR, Measure, in_frame
+from service.formats.provenance import in_glb
 from service.formats.source import Source
 from tests.scenes import look_at_camera
 
@@ -138,6 +140,14 @@ def test_damaged_file_is_invalid(name: str, scene: BakedScene) -> None:
     for damaged in (data[: len(data) // 2], data[:-100], b"", b"x" * 500):
         with pytest.raises((AssetInvalid, SceneInvalid)):
             FORMATS[name].read(damaged)
+
+
+def test_provenance_is_read_as_it_was_written(scene: BakedScene) -> None:
+    known = Provenance("Büste", "museum.zip", "A. Photographer", "CC0", "2030-01-02", "1.2", {"seed": 0})
+    for provenance in (known, Provenance(), Provenance(title="Vase")):
+        assert in_glb(FORMATS["glb"].write(Source(scene, provenance=provenance))) == provenance
+    assert in_glb(FORMATS["glb"].write(Source(scene))) is None
+    assert in_glb(b"glTF") is None
 
 
 # Exporting

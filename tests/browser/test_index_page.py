@@ -181,7 +181,7 @@ def test_files_of_a_job_are_listed_with_size_quality_and_what_opens_them(page: P
     expect(files.locator("summary")).to_have_text("Files: 1 of 3 formats, 12.3 MB")
     files.locator("summary").click()
     row = files.locator("[data-format=glb]")
-    expect(row).to_contain_text("the glb form. Opens in: a viewer")
+    expect(row).to_contain_text("The glb form. Opens in: a viewer")
     expect(row).to_contain_text("12.3 MB")
     expect(row).to_contain_text("31.23 dB")
     link = row.get_by_role("link", name="scene.glb")

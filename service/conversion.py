@@ -125,12 +125,8 @@ def convert(
     report = report.with_format("glb", row)
     _write(out_dir, REPORT, report.as_bytes())
     measure = Measure.on(capture, scene.background, device)
-    if measure and report.psnr.mean is not None:
-        measure.remember(scene, report.psnr.mean)
-    del capture
-    for name, row in exported(asset, others, out_dir, measure, lambda name: stages.within_format(others.index(name))):
-        report = report.with_format(name, row).with_seconds("formats", row.seconds)
-        _write(out_dir, REPORT, report.as_bytes())
+    del capture  # the photos that were trained on are needed no longer
+    report = _with_others(report, asset, others, out_dir, measure, stages)
     if checkpoint_dir:
         shutil.rmtree(checkpoint_dir, ignore_errors=True)
     stages.done(psnr=report.psnr.mean)
@@ -146,6 +142,18 @@ def _export(source: Source, folder: Path) -> tuple[Source, int]:
     held = form.read((folder / SCENE).read_bytes())
     assert isinstance(held, BakedScene)
     return Source(held, source.title, folder / SCENE, source.provenance), size
+
+
+def _with_others(
+    report: Report, asset: Source, names: Sequence[str], folder: Path, measure: Measure | None, stages: Stages
+) -> Report:
+    """The report with the other formats, which are exported in turn; it is written as each of them is done."""
+    if measure and report.psnr.mean is not None:
+        measure.remember(asset.scene, report.psnr.mean)
+    for name, row in exported(asset, names, folder, measure, lambda name: stages.within_format(names.index(name))):
+        report = report.with_format(name, row).with_seconds("formats", row.seconds)
+        _write(folder, REPORT, report.as_bytes())
+    return report
 
 
 def _remove_earlier(folder: Path) -> None:

@@ -179,7 +179,7 @@ _ALL = (
         "Polyfield's viewer; three.js, model-viewer (baked colours)", _write_lq, _read_glb,
     ),
     Format(
-        "gltf", "scene.gltf.zip", ZIP, "scene.glb taken apart: .gltf, .bin and PNGs",
+        "gltf", "scene.gltf.zip", ZIP, "the asset taken apart: .gltf, .bin and PNGs",
         "any glTF viewer (baked colours); a text editor", _write_gltf, _read_gltf,
     ),
     Format(

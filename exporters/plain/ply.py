@@ -5,7 +5,7 @@ import numpy as np
 from core.baked import BakedScene
 from core.errors import SceneInvalid
 from exporters.plain.placed import placed
-from exporters.plain.subdivision import pieces_of
+from exporters.plain.subdivision import pieces_of, texels_of_a_side
 
 FILE_NAME = "scene.ply"
 MOST_TRIANGLES = 1_000_000  # 20 MB
@@ -32,14 +32,19 @@ _FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
 def write_ply(scene: BakedScene, most_triangles: int = MOST_TRIANGLES) -> dict[str, bytes]:
     """`{"scene.ply": ...}`: triangles small enough that a colour at each corner says what the texture did.
 
-    Every triangle is divided evenly, as finely as `most_triangles` allows (at most 8 times a side; never joined).
+    Every triangle is divided evenly, as finely as `most_triangles` allows (at most 8 times a side, and not finer than
+    the texels of most sides; never joined).
     Pieces that are mostly hole are left out, and corners at one place are one vertex with their mean colour.
 
     Raises:
         SceneInvalid: nothing is opaque.
     """
-    sides = int(np.clip(np.sqrt(most_triangles / scene.triangle_count), 1, MOST_SIDES))
-    parts = [part for page in scene.pages for part in pieces_of(page, placed(scene, page), sides)]
+    most_sides = int(np.clip(np.sqrt(most_triangles / scene.triangle_count), 1, MOST_SIDES))
+    parts = [
+        part
+        for page in scene.pages
+        for part in pieces_of(page, placed(scene, page), min(most_sides, texels_of_a_side(page)))
+    ]
     corners = np.concatenate([part.corners for part in parts]).reshape(-1, 3)
     colors = np.repeat(np.concatenate([part.colors for part in parts]), 3, 0)
     if not len(corners):

@@ -24,6 +24,12 @@ class Pieces:
     colors: np.ndarray
 
 
+def texels_of_a_side(page: Page) -> int:
+    """How many texels' widths the longer side in x or y of a triangle is long, at least 1; the median."""
+    corners = page.texcoords[page.triangles] * np.array(page.features_u8.shape[1::-1], np.float32)
+    return max(1, round(float(np.median(np.ptp(corners, axis=1).max(-1)))))
+
+
 def pieces_of(page: Page, positions: np.ndarray, sides: int) -> Iterator[Pieces]:
     """The page's triangles, some at a time, each divided into sides² equal ones, of which the shown are kept.
 

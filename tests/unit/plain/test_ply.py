@@ -85,6 +85,11 @@ def test_triangles_are_as_many_as_allowed_and_never_fewer_than_the_scenes(scene:
     assert len(loaded(write_ply(flat, most_triangles=1)).faces) == 2
 
 
+def test_triangles_are_no_finer_than_texels(scene: BakedScene) -> None:
+    coarse = square(GREY[:2, :2], WHOLE[:2, :2], scene)
+    assert len(loaded(write_ply(coarse)).faces) == 2 * 2 * 2
+
+
 def test_scene_of_holes_is_refused(scene: BakedScene) -> None:
     with pytest.raises(SceneInvalid, match="opaque"):
         write_ply(square(GREY, ~WHOLE, scene))

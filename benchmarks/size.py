@@ -98,8 +98,9 @@ def table(rows: list[SizeRow]) -> str:
 def _cells(row: SizeRow, known: Mapping[str, SizeRow]) -> tuple[str, ...]:
     share, loss = share_and_loss(row, known)
     goal = GOALS.get(row.name)
+    gain = figure(round(-loss, 2) + 0.0, "+.2f")  # + 0.0: no negative zero
     return (
-        row.name, figure(row.bytes / 1e6), f"{100 * share:.1f} %", figure(row.psnr), figure(round(-loss, 2) + 0.0, "+.2f"),
+        row.name, figure(row.bytes / 1e6), f"{100 * share:.1f} %", figure(row.psnr), gain,
         f"{100 * goal[0]:.0f} %, -{goal[1]} dB: {'met' if goal_met(row, known) else 'missed'}" if goal else "",
         str(row.quads), figure(row.texels / 1e6), str(row.pages), figure(row.seconds, ".1f"),
     )  # fmt: skip

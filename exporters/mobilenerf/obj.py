@@ -10,12 +10,15 @@ OUTSIDE = 1e-5
 
 
 def obj_bytes(positions: np.ndarray, page: Page) -> bytes:
-    """The page's triangles at `positions` [V, 3] (float32, which come back exactly); v counts from the bottom."""
+    """The page's triangles at `positions` [V, 3]; v counts from the bottom. All numbers come back exactly.
+
+    float32 takes nine digits, but 1 - v of a texel near the top, beside which it is small, takes more.
+    """
     upward = page.texcoords.astype(np.float64) * [1.0, -1.0] + [0.0, 1.0]
     corners = np.repeat(page.triangles.astype(np.int64).ravel() + 1, 2)
     text = [
         "v %.9g %.9g %.9g\n" * len(positions) % tuple(positions.ravel().tolist()),
-        "vt %.10g %.10g\n" * len(upward) % tuple(upward.ravel().tolist()),
+        "vt %.9g %.17g\n" * len(upward) % tuple(upward.ravel().tolist()),
         "f %d/%d %d/%d %d/%d\n" * len(page.triangles) % tuple(corners.tolist()),
     ]
     return "".join(text).encode("ascii")

@@ -13,8 +13,8 @@ from core.baked import BakedScene
 from core.errors import AssetInvalid
 from exporters.gltf import read_glb, read_gltf, write_glb, write_gltf
 from tests.scenes import random_scene
+from tests.unit.exporters.equality import assert_equal
 from tests.unit.exporters.glb import join, split
-from tests.unit.exporters.test_gltf_round_trip import assert_equal
 
 Files = dict[str, bytes]
 SMALL: Files = write_gltf(random_scene(np.random.default_rng(5), 4))

@@ -1,37 +1,20 @@
 """What is written comes back bit for bit."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.baked import BakedScene, Page
-from core.camera import Camera
+from core.baked import BakedScene
 from core.errors import SceneInvalid
 from exporters.glsl import VERSIONS, shader_sources
 from exporters.gltf import read_glb, read_shaders, write_glb
 from exporters.gltf.extension import NAME
 from tests.scenes import random_network, random_scene
+from tests.unit.exporters.equality import assert_equal
 from tests.unit.exporters.glb import split
-
-
-def assert_equal(actual: BakedScene, expected: BakedScene) -> None:
-    """Bit for bit."""
-    assert len(actual.pages) == len(expected.pages)
-    for page, wanted in zip(actual.pages, expected.pages, strict=True):
-        for field in fields(Page):
-            _assert_array_equal(getattr(page, field.name), getattr(wanted, field.name))
-    for array, wanted_array in zip(
-        (*actual.network.weights, *actual.network.biases),
-        (*expected.network.weights, *expected.network.biases),
-        strict=True,
-    ):
-        _assert_array_equal(array, wanted_array)
-    assert actual.background == expected.background
-    _assert_array_equal(actual.asset_from_object, expected.asset_from_object)
-    assert [_camera(c) for c in actual.cameras] == [_camera(c) for c in expected.cameras]
 
 
 def test_scene_comes_back_bit_for_bit(scene: BakedScene) -> None:
@@ -128,13 +111,3 @@ def test_sheared_object_transform_is_refused(scene: BakedScene) -> None:
     sheared[0, 1] = 0.1
     with pytest.raises(SceneInvalid, match="asset_from_object"):
         write_glb(replace(scene, asset_from_object=sheared))
-
-
-def _assert_array_equal(actual: np.ndarray, expected: np.ndarray) -> None:
-    assert actual.dtype == expected.dtype
-    assert actual.shape == expected.shape
-    assert actual.tobytes() == np.ascontiguousarray(expected).tobytes()  # tells -0.0 from 0.0
-
-
-def _camera(camera: Camera) -> tuple:
-    return camera.name, camera.world_from_camera.tolist(), camera.focal_px, camera.centre_px, camera.size_px

@@ -15,7 +15,7 @@ from exporters.usd.layers import stage_of
 from exporters.usd.mesh import upside_down
 from exporters.usd.writer import Form
 from tests.scenes import random_network, random_scene
-from tests.unit.exporters.test_gltf_round_trip import assert_equal
+from tests.unit.exporters.equality import assert_equal
 
 FORMS: tuple[Form, ...] = ("usdc", "usda", "usdz")
 

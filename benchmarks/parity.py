@@ -9,6 +9,7 @@ the photo. With --out, writes the photo, the renderings, their differences (32 t
 import argparse
 import json
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -16,7 +17,8 @@ import moderngl
 import numpy as np
 from PIL import Image
 
-from core.baked import BakedScene, Renderer
+from core.baked import BakedScene
+from core.camera import Camera
 from core.capture import View
 from core.datasets import read_capture
 from core.metrics import psnr
@@ -25,7 +27,11 @@ from exporters.glsl import VERSIONS, Dialect
 from tests.parity.compare import Comparison, compare, pixels_with_edges
 from tests.parity.gl_renderer import GlRenderer, Mode
 
-REFERENCES: dict[Mode, Renderer] = {"deferred": render_deferred, "forward": render_forward}
+Renderer = Callable[[BakedScene, Camera], np.ndarray]
+REFERENCES: dict[Mode, Renderer] = {
+    "deferred": render_deferred,
+    "forward": render_forward,
+}
 DIFFERENCE_GAIN = 32  # makes one step of 8 bits visible
 
 

@@ -12,7 +12,7 @@ OUTSIDE = 1e-5
 def obj_bytes(positions: np.ndarray, page: Page) -> bytes:
     """The page's triangles at `positions` [V, 3]; v counts from the bottom. All numbers come back exactly.
 
-    float32 takes nine digits, but 1 - v of a texel near the top, beside which it is small, takes more.
+    float32 takes nine digits; 1 - v takes more where v is small.
     """
     upward = page.texcoords.astype(np.float64) * [1.0, -1.0] + [0.0, 1.0]
     corners = np.repeat(page.triangles.astype(np.int64).ravel() + 1, 2)

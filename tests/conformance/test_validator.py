@@ -1,47 +1,16 @@
 """Khronos' glTF validator finds no error and no warning."""
 
-import json
-import os
-import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from core.baked import BakedScene
 from exporters.gltf import Provenance, read_glb, write_glb, write_gltf, write_lq_glb, write_web_glb
+from tests.conformance.gltf_validation import assert_clean, validated, validated_file
 from tests.scenes import random_scene
-
-SCRIPT = Path(__file__).with_name("validate_gltf.mjs")
-NODE_MODULES = Path(__file__).parents[2] / "viewer_static" / "node_modules"
-
-
-def validated(glb: bytes, folder: Path) -> dict[str, Any]:
-    """The validator's report on a .glb."""
-    (folder / "scene.glb").write_bytes(glb)
-    return validated_file(folder / "scene.glb")
-
-
-def validated_file(path: Path) -> dict[str, Any]:
-    """The validator's report on a .glb, or a .gltf with its files beside it."""
-    node = shutil.which("node", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
-    assert node, "Node is missing, both on the PATH and beside Python"
-    assert (NODE_MODULES / "gltf-validator").is_dir(), "gltf-validator is missing: run `npm ci` in viewer_static"
-    run = subprocess.run([node, SCRIPT, NODE_MODULES, path], capture_output=True, text=True, timeout=60, check=True)
-    return json.loads(run.stdout)
-
-
-def assert_clean(report: dict[str, Any]) -> None:
-    issues = report["issues"]
-    serious = [message for message in issues["messages"] if message["severity"] < 2]
-    assert (issues["numErrors"], issues["numWarnings"], serious) == (0, 0, [])
-    # Hints: the validator does not know the extension, nor that it uses the feature textures.
-    assert {message["code"] for message in issues["messages"]} <= {"UNSUPPORTED_EXTENSION", "UNUSED_OBJECT"}
 
 
 def test_validator_finds_nothing_in_a_scene_with_pages_and_cameras(scene: BakedScene, tmp_path: Path) -> None:

@@ -19,6 +19,9 @@ from core.render.visibility import Visibility, subpixel_camera
 # 1/256 px and computes in float32, so a few samples on edges fall on the other side.
 INTERIOR_DB = 50.0
 FLIPPED_SHARE = 0.005
+# Of files that round features.
+QUANTISED_DB = 45.0
+QUANTISED_VISIBLE = 16 / 255  # ten deviations of what rounded features cost (44 dB); another texel differs by more
 
 COVERAGE_STEP = 1 / 4  # one sub-pixel
 SMALLEST_ERROR = 1e-12  # 120 dB: stands for "equal"

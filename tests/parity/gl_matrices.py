@@ -1,8 +1,10 @@
 """OpenGL's matrices of a camera, as the extension's README defines them. Rows first, float64."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from core.baked import BakedScene
+from core.baked import BakedScene, similarity_scale
 from core.camera import Camera
 
 NEAREST_SHARE = 1e-4  # near plane, of the scene's diagonal, if something reaches behind the camera
@@ -12,6 +14,13 @@ def view_from_object(camera: Camera, world_from_object: np.ndarray | None) -> np
     """[4, 4] modelViewMatrix; `world_from_object` is the identity if None."""
     view = np.linalg.inv(camera.world_from_camera)
     return view if world_from_object is None else view @ world_from_object
+
+
+def in_asset(camera: Camera, asset_from_object: np.ndarray) -> Camera:
+    """The camera that sees the asset as `camera` sees the object."""
+    pose = asset_from_object @ camera.world_from_camera
+    pose[:3, :3] /= similarity_scale(asset_from_object)
+    return replace(camera, world_from_camera=pose)
 
 
 def projection(camera: Camera, model_view: np.ndarray, scene: BakedScene) -> np.ndarray:

@@ -10,12 +10,10 @@ from core.baked import BakedScene
 from core.render.reference import render_deferred
 from exporters.compaction import repacked
 from exporters.gltf import write_glb, write_lq_glb, write_web_glb
-from tests.parity.compare import FLIPPED_SHARE, INTERIOR_DB, compare, pixels_with_edges
+from tests.parity.compare import FLIPPED_SHARE, INTERIOR_DB, QUANTISED_DB, QUANTISED_VISIBLE, compare, pixels_with_edges
 from tests.parity.gl_renderer import GlRenderer
 from tests.scenes import random_scene
 
-QUANTISED_DB = 45.0
-QUANTISED_VISIBLE = 16 / 255  # ten deviations of what rounded features cost (44 dB); another texel differs by more
 # Half the texels a side of noise made by hand, which has nothing to average away.
 PHONE_DB, PHONE_FLIPPED = 25.0, 0.08
 

@@ -8,25 +8,18 @@ import numpy as np
 import pytest
 from pxr import UsdGeom
 
-from core.baked import BakedScene, similarity_scale
-from core.camera import Camera
+from core.baked import BakedScene
 from core.render.reference import render_forward, visibility
 from exporters.usd import write_usd
 from exporters.usd.quicklook import write_quicklook
 from exporters.usd.writer import Form
 from tests.parity.compare import FLIPPED_SHARE, INTERIOR_DB, Comparison, compare, pixels_with_edges
+from tests.parity.gl_matrices import in_asset
 from tests.parity.usd_renderer import Look, UsdRenderer
 from tests.scenes import random_scene
 
 NEURAL: tuple[Look, ...] = ("storm", "materialx")
 FORMS: tuple[Form, ...] = ("usdc", "usda", "usdz")
-
-
-def in_asset(camera: Camera, asset_from_object: np.ndarray) -> Camera:
-    """The camera that sees the asset as `camera` sees the object."""
-    pose = asset_from_object @ camera.world_from_camera
-    pose[:3, :3] /= similarity_scale(asset_from_object)
-    return replace(camera, world_from_camera=pose)
 
 
 def compared(renderer: UsdRenderer, scene: BakedScene) -> list[Comparison]:

@@ -1,11 +1,11 @@
 """Image files of the kinds that assets may hold: PNG and lossless WebP."""
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 from exporters.png import decode_png, png_size
+from exporters.threads import mapped
 from exporters.webp import decode_webp, is_webp, webp_size
 
 
@@ -29,5 +29,4 @@ def decode_image(data: bytes, subject: str) -> np.ndarray:
 
 def decode_images(files: Sequence[bytes], subject: str) -> list[np.ndarray]:
     """What `decode_image` returns for each file, several at a time (codecs work outside Python's lock)."""
-    with ThreadPoolExecutor() as pool:
-        return list(pool.map(lambda data: decode_image(data, subject), files))
+    return mapped(lambda data: decode_image(data, subject), files)

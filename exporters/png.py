@@ -4,13 +4,13 @@ import io
 import struct
 import zlib
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from PIL import Image
 
 from core.conventions import MAX_PAGE_SIZE_PX
 from exporters.invalid import invalid
+from exporters.threads import mapped
 
 # (zlib level, strategy), tried on a band of each image. Pillow chooses each row's filter by the least sum of absolute
 # differences, within 0.1 % of choosing by entropy. Measured on lego at 400 px, MB of features 0-3, 4-7 and colour:
@@ -18,7 +18,7 @@ from exporters.invalid import invalid
 # recoded for the web, run length 2.32 2.85 2.18, Huffman alone 2.25 2.99 2.10, level 9 2.51 3.29 2.13;
 # for phones, run length 0.29 0.39 0.56, Huffman alone 0.32 0.38 0.52, level 9 0.26 0.40 0.52.
 STRATEGIES = ((6, zlib.Z_RLE), (6, zlib.Z_HUFFMAN_ONLY), (9, zlib.Z_DEFAULT_STRATEGY))
-BAND_PX = 128  # rows; an image of fewer is tried as a whole
+BAND_TEXELS = 1 << 16  # an image of fewer is tried as a whole
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _HEADER = struct.Struct(">8sI4sIIBBBBB")
@@ -39,17 +39,22 @@ _DECODING_ERRORS = (
 
 def encode_pngs(images: Sequence[np.ndarray]) -> list[bytes]:
     """PNG files of uint8 [height, width, 4] images, in order, several at a time (zlib works outside Python's lock)."""
-    with ThreadPoolExecutor() as pool:
-        return list(pool.map(encode_png, images))
+    return mapped(encode_png, images)
 
 
 def encode_png(image: np.ndarray) -> bytes:
     """A PNG file of a uint8 [height, width, 4] image; straight alpha, no colour profile; every byte is kept."""
-    first = max(0, (len(image) - BAND_PX) // 2)
-    band = image[first : first + BAND_PX]
+    band = middle_band(image)
     tried = [(len(data), strategy, data) for strategy in STRATEGIES for data in [_encoded(band, *strategy)]]
     _, strategy, data = min(tried)
     return data if len(band) == len(image) else _encoded(image, *strategy)
+
+
+def middle_band(image: np.ndarray) -> np.ndarray:
+    """The rows that codings are tried on."""
+    rows = max(1, BAND_TEXELS // image.shape[1])
+    first = max(0, (len(image) - rows) // 2)
+    return image[first : first + rows]
 
 
 def _encoded(image: np.ndarray, level: int, strategy: int) -> bytes:
@@ -78,8 +83,7 @@ def png_size(data: bytes, subject: str) -> tuple[int, int]:
 
 def decode_pngs(files: Sequence[bytes], subject: str) -> list[np.ndarray]:
     """What `decode_png` returns for each file, several at a time."""
-    with ThreadPoolExecutor() as pool:
-        return list(pool.map(lambda data: decode_png(data, subject), files))
+    return mapped(lambda data: decode_png(data, subject), files)
 
 
 def decode_png(data: bytes, subject: str) -> np.ndarray:

@@ -15,15 +15,17 @@ from exporters.compaction.recoding import Recoding, recoding_of, widened
 from exporters.compaction.resolution import SizeOptions, Trade, shrunk, size_options
 from exporters.compaction.sharing import with_constant_axes_collapsed, with_equal_patches_shared, without_empty
 from exporters.compaction.surface import surface_points
+from exporters.threads import mapped
 
 T = TypeVar("T")
-TEXELS_AT_ONCE = 1 << 18  # 10 MB of moments
+TEXELS_AT_ONCE = 1 << 18  # 10 MB of moments; with less, small steps wait for each other
 SAMPLE_POINTS = 40_000
 SAMPLE_QUADS = 8_000
 SEARCH_STEPS = 14
 FINEST_STEP = 1e-4
 LEAST_BITS = 0.2  # of a channel
 BITS_OF_HOLES = 0.5
+LEAST_WEIGHT = 1e-30  # times an infinite error stays infinite
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ def repacked(scene: BakedScene) -> BakedScene:
     quads with patches (`quads_of`) stays as it is.
     """
     parts, others = _parts(scene)
-    return replace(scene, pages=(*_lossless(joined(parts)), *others)) if parts else scene
+    return replace(scene, pages=(*_lossless(parts), *others)) if parts else scene
 
 
 def compacted(scene: BakedScene, quality: Quality = WEB) -> BakedScene:
@@ -72,14 +74,15 @@ def compacted(scene: BakedScene, quality: Quality = WEB) -> BakedScene:
         return repacked(scene)
     recoding = recoding_of(scene.network, seen)
     for page in scene.pages:
-        for rows in np.array_split(page.features_u8, max(1, page.features_u8.size // 8 // TEXELS_AT_ONCE)):
-            recoding = widened(recoding, rows[is_opaque(rows)])
+        recoding = widened(recoding, page.features_u8)
     parts, others = _parts(scene)
     pages: list[Page] = []
     if parts:
-        quads = joined(parts)
-        recoding, trade = _settled(quads, recoding, quality)
-        pages += _lossless(_reduced(quads, recoding, trade, quality))
+        recoding, trade = _settled(parts, recoding, quality)
+        reduced = _reduced_in_turn(parts, recoding, trade, quality)
+        if not reduced and not others:
+            return repacked(scene)
+        pages += _lossless(reduced) if reduced else ()
     else:
         recoding = _coarsest(recoding, quality)
     pages += [_recoded(page, recoding, quality) for page in others]
@@ -88,13 +91,16 @@ def compacted(scene: BakedScene, quality: Quality = WEB) -> BakedScene:
 
 def _parts(scene: BakedScene) -> tuple[list[Quads], list[Page]]:
     """The pages that are made of quads, taken apart, and the others."""
-    found = [(page, quads_of(page)) for page in scene.pages]
+    found = list(zip(scene.pages, mapped(quads_of, scene.pages), strict=True))
     return [quads for _, quads in found if quads is not None], [page for page, quads in found if quads is None]
 
 
-def _lossless(quads: Quads) -> tuple[Page, ...]:
-    quads = without_empty(quads)
-    return packed(with_equal_patches_shared(replace(quads, patches=with_constant_axes_collapsed(quads.patches))))
+def _lossless(parts: list[Quads]) -> tuple[Page, ...]:
+    """All of them on pages; takes them from the list, so that they are in memory once."""
+    for number, quads in enumerate(parts):
+        parts[number] = replace(quads, patches=with_constant_axes_collapsed(quads.patches))
+        del quads
+    return packed(with_equal_patches_shared(without_empty(joined(parts))))
 
 
 def _budget(quality: Quality) -> float:
@@ -107,9 +113,9 @@ def _coarsest(recoding: Recoding, quality: Quality) -> Recoding:
     return _search(lambda step: (found := recoding.with_step(step), found.squared_error()), _budget(quality))
 
 
-def _settled(quads: Quads, recoding: Recoding, quality: Quality) -> tuple[Recoding, Trade]:
+def _settled(parts: list[Quads], recoding: Recoding, quality: Quality) -> tuple[Recoding, Trade]:
     """Rounding and resolution that share the budget at the least bytes, found on some of the quads."""
-    sample = _Sample(quads, recoding, quality)
+    sample = _Sample(parts, recoding, quality)
 
     def tried(step: float) -> tuple[tuple[Recoding, Trade], float]:
         coded = recoding.with_step(step)
@@ -136,22 +142,24 @@ def _search(tried: Callable[[float], tuple[T, float]], budget: float) -> T:
 class _Sample:
     """Some of the quads, to find out on."""
 
-    def __init__(self, quads: Quads, recoding: Recoding, quality: Quality) -> None:
-        some = np.random.default_rng(0).permutation(len(quads))[:SAMPLE_QUADS]
-        weight, owner = _patch_weights(quads), np.zeros(len(quads.patches.sizes), bool)
-        owner[quads.patch[some]] = True
+    def __init__(self, parts: list[Quads], recoding: Recoding, quality: Quality) -> None:
+        numbers = np.random.default_rng(0).permutation(sum(map(len, parts)))[:SAMPLE_QUADS]
         self._options: list[tuple[SizeOptions, np.ndarray]] = []
-        squares, pairs, texels, covered = np.zeros(FEATURE_CHANNELS), 0, 0, 0.0
-        for numbers, content in quads.patches.by_size(TEXELS_AT_ONCE, np.flatnonzero(owner)):
-            features = content[..., :FEATURE_CHANNELS]
-            y, opaque = recoding.coordinates(features), is_opaque(features)
-            self._options.append((size_options(y, opaque, quality.most, quality.hole_cost), weight[numbers]))
-            both = opaque[:, :, 1:] & opaque[:, :, :-1]
-            squares += ((y[:, :, 1:] - y[:, :, :-1])[both] ** 2).sum(0)
-            pairs, texels = pairs + int(both.sum()), texels + opaque.size
-            covered += float((opaque.mean((1, 2)) * weight[numbers]).sum())
+        squares, pairs, texels, covered, patches = np.zeros(FEATURE_CHANNELS), 0, 0, 0.0, 0
+        mean, first = _mean_area(parts), 0
+        for quads in parts:
+            here = numbers[(numbers >= first) & (numbers < first + len(quads))] - first
+            weight, first = _patch_weights(quads, mean), first + len(quads)
+            for some in quads.patches.groups(TEXELS_AT_ONCE, np.unique(quads.patch[here])):
+                features = quads.patches.content(some)[..., :FEATURE_CHANNELS]
+                y, opaque = recoding.coordinates(features), is_opaque(features)
+                self._options.append((size_options(y, opaque, quality.most, quality.hole_cost), weight[some]))
+                both = opaque[:, :, 1:] & opaque[:, :, :-1]
+                squares += ((y[:, :, 1:] - y[:, :, :-1])[both] ** 2).sum(0)
+                pairs, texels, patches = pairs + int(both.sum()), texels + opaque.size, patches + len(some)
+                covered += float((opaque.mean((1, 2)) * weight[some]).sum())
         self._difference = np.sqrt(squares / max(pairs, 1))
-        self._texels = texels / int(owner.sum())
+        self._texels = texels / patches
         self._covered = max(covered, 1e-9)
 
     def error(self, trade: Trade) -> float:
@@ -171,35 +179,57 @@ class _Sample:
         return Trade(float(slope), float(np.maximum(bits, LEAST_BITS).sum() + BITS_OF_HOLES))
 
 
-def _patch_weights(quads: Quads) -> np.ndarray:
-    """[N] each patch's share of the surface, mean 1; the largest of the quads that show it."""
-    weight, areas = np.zeros(len(quads.patches.sizes)), quads.world_areas()
-    np.maximum.at(weight, quads.patch, areas)
-    return weight / areas.mean() if areas.mean() > 0 else np.ones(len(weight))
+def _mean_area(parts: list[Quads]) -> float:
+    """Of all quads; 1 where none has any, so that weights stay finite."""
+    return float(np.concatenate([quads.world_areas() for quads in parts]).mean()) or 1.0
 
 
-def _reduced(quads: Quads, recoding: Recoding, trade: Trade, quality: Quality) -> Quads:
-    """Patches at their chosen resolution, in bytes of the recoding; quads that are not worth theirs are left out."""
-    weight = _patch_weights(quads)
-    numbers, sizes, contents = [], [], []
-    for some, texels in quads.patches.by_size(TEXELS_AT_ONCE):
-        features = texels[..., :FEATURE_CHANNELS]
-        y, opaque = recoding.coordinates(features), is_opaque(features)
+def _patch_weights(quads: Quads, mean_area: float) -> np.ndarray:
+    """[N] each patch's share of the surface, mean 1 and above 0; the largest of the quads that show it."""
+    weight = np.full(len(quads.patches.sizes), LEAST_WEIGHT)
+    np.maximum.at(weight, quads.patch, quads.world_areas() / mean_area)
+    return weight
+
+
+def _reduced_in_turn(parts: list[Quads], recoding: Recoding, trade: Trade, quality: Quality) -> list[Quads]:
+    """`_reduced` of each, where anything is left; takes them from the list to keep little in memory."""
+    mean_area, found = _mean_area(parts), []
+    while parts:
+        found.append(_reduced(parts.pop(0), mean_area, recoding, trade, quality))
+    return [quads for quads in found if quads is not None]
+
+
+def _reduced(quads: Quads, mean_area: float, recoding: Recoding, trade: Trade, quality: Quality) -> Quads | None:
+    """Patches at their chosen resolution, in bytes of the recoding; quads that are not worth theirs are left out.
+
+    None where none is.
+    """
+    weight = _patch_weights(quads, mean_area)
+
+    def reduced(some: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Patches of one size as (numbers [n], texels [n, h, w, 11]), of one new size each."""
+        texels = quads.patches.content(some)
+        y, opaque = recoding.coordinates(texels[..., :FEATURE_CHANNELS]), is_opaque(texels)
         best, _ = size_options(y, opaque, quality.most, quality.hole_cost).best(weight[some], trade)
         values = np.concatenate([y, texels[..., FEATURE_CHANNELS:].astype(np.float32)], -1)
+        found = []
         for height, width in np.unique(best[best[:, 0] > 0], axis=0):
             here = (best == (height, width)).all(1)
             part = values[here], opaque[here]
             if (height, width) != texels.shape[1:3]:
                 part = shrunk(*part, (height, width))
-            numbers.append(some[here])
-            sizes.append(best[here])
-            contents.append(_bytes(*part, recoding, quality).reshape(-1, CHANNELS))
-    new = np.full(len(quads.patches.sizes), -1)
-    order = np.concatenate(numbers)
+            found.append((some[here], _bytes(*part, recoding, quality)))
+        return found
+
+    parts = [part for group in mapped(reduced, quads.patches.groups(TEXELS_AT_ONCE)) for part in group]
+    if not parts:
+        return None
+    order = np.concatenate([numbers for numbers, _ in parts])
+    new = np.full(len(weight), -1)
     new[order] = np.arange(len(order))
     left = quads.subset(new[quads.patch] >= 0)
-    patches = Patches(np.concatenate(sizes), np.concatenate(contents))
+    sizes = np.concatenate([np.tile(texels.shape[1:3], (len(texels), 1)) for _, texels in parts])
+    patches = Patches(sizes, np.concatenate([texels.reshape(-1, CHANNELS) for _, texels in parts]))
     return Quads(left.corners, left.ends, left.triangles, new[left.patch], patches).in_order_of_patches()
 
 

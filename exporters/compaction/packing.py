@@ -4,7 +4,7 @@ import numpy as np
 
 from core.baked import Page
 from core.conventions import FEATURE_CHANNELS, MAX_PAGE_SIZE_PX
-from exporters.compaction.quads import CHANNELS, Patches, Quads
+from exporters.compaction.quads import CHANNELS, TEXEL, TEXELS_AT_ONCE, Patches, Quads
 
 # What a further page has to save: each costs a draw call and three textures.
 WORTH_A_PAGE = 1 << 19  # texels, 6 MB on the graphics processor
@@ -94,13 +94,12 @@ def _page(
     quads: Quads, patches: Patches, size: tuple[int, int], numbers: np.ndarray, places: np.ndarray, slot: np.ndarray
 ) -> Page:
     image = np.zeros((*size, CHANNELS), np.uint8)
-    sizes, offsets = patches.sizes[numbers], patches.offsets[numbers]
-    for height, width in np.unique(sizes, axis=0):
-        some = np.flatnonzero((sizes == (height, width)).all(1))
-        rows = places[some, 0][:, None, None] + np.arange(height)[:, None]
-        columns = places[some, 1][:, None, None] + np.arange(width)
-        texels = patches.texels[offsets[some][:, None] + np.arange(height * width)]
-        image[rows, columns] = texels.reshape(len(some), height, width, CHANNELS)
+    sizes = patches.sizes[numbers]
+    for some in patches.groups(TEXELS_AT_ONCE, numbers):
+        texels, (top, left) = patches.content(some), places[slot[some]].T
+        rows = top[:, None, None] + np.arange(texels.shape[1])[:, None]
+        columns = left[:, None, None] + np.arange(texels.shape[2])
+        image.view(TEXEL)[rows, columns, 0] = np.ascontiguousarray(texels).view(TEXEL)[..., 0]
     mine = slot[quads.patch]
     corner = places[mine][:, None, ::-1] + quads.ends * (sizes[mine][:, None, ::-1] - 1)
     texcoords = (corner + 0.5) / (size[1], size[0])

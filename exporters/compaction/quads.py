@@ -5,16 +5,19 @@ Patches of all sizes lie one after the other in one array; patch n is rows offse
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from core.baked import Page
-from core.conventions import FEATURE_CHANNELS, is_opaque
+from core.conventions import FEATURE_CHANNELS
 
 CHANNELS = FEATURE_CHANNELS + 3  # features, then the fallback's colour
 # How far, in texels, a corner may be from a texel's centre: float32 on 4096 texels gives 2e-4, other tools' decimals
 # 2e-3.
 OFF_CENTRE = 0.01
+TEXELS_AT_ONCE = 1 << 18  # 3 MB, and indices
+TEXEL = np.dtype((np.void, CHANNELS))  # copied as a whole: several times faster than channel by channel
 
 
 @dataclass(frozen=True)
@@ -33,27 +36,45 @@ class Patches:
         areas: np.ndarray = self.sizes.prod(1)
         return areas
 
-    @property
+    @cached_property
     def offsets(self) -> np.ndarray:
         """[N] first row of each patch."""
         offsets: np.ndarray = np.cumsum(self.areas) - self.areas
         return offsets
 
-    def by_size(self, most_texels: int, numbers: np.ndarray | None = None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """(numbers [n], texels [n, h, w, 11]) of patches of one size, about `most_texels` at a time.
+    def groups(self, most_texels: int, numbers: np.ndarray | None = None) -> Iterator[np.ndarray]:
+        """Numbers [n] of patches of one size, about `most_texels` texels at a time.
 
         Args:
             numbers: the patches to go through; None: all.
         """
         numbers = np.arange(len(self.sizes)) if numbers is None else numbers
-        offsets, sizes = self.offsets, self.sizes[numbers]
+        sizes = self.sizes[numbers]
         for height, width in np.unique(sizes, axis=0):
             equal = numbers[(sizes == (height, width)).all(1)]
-            at_once = max(1, most_texels // (height * width))
-            for first in range(0, len(equal), at_once):
-                some = equal[first : first + at_once]
-                rows = offsets[some][:, None] + np.arange(height * width)
-                yield some, self.texels[rows].reshape(len(some), height, width, CHANNELS)
+            yield from (equal[part] for part in slices(len(equal), most_texels // (height * width)))
+
+    def content(self, numbers: np.ndarray) -> np.ndarray:
+        """Texels [n, h, w, 11] of patches of one size; not to be written to."""
+        height, width = self.sizes[numbers[0]]
+        starts, area = self.offsets[numbers], height * width
+        if (np.diff(starts) == area).all():
+            texels = self.texels[starts[0] : starts[0] + len(numbers) * area]
+        else:
+            texels = self.texels.view(TEXEL)[starts[:, None] + np.arange(area), 0][..., None].view(np.uint8)
+        return texels.reshape(len(numbers), height, width, CHANNELS)
+
+    def place(self, numbers: np.ndarray, texels: np.ndarray) -> None:
+        """Writes the texels [n, h, w, 11] of patches that have this size."""
+        area = texels.shape[1] * texels.shape[2]
+        to = self.offsets[numbers][:, None] + np.arange(area)
+        self.texels.view(TEXEL)[to, 0] = np.ascontiguousarray(texels).view(TEXEL).reshape(len(numbers), area)
+
+
+def slices(count: int, at_once: int) -> Iterator[slice]:
+    """Consecutive ones of `at_once`, but at least 1, that make up `count`."""
+    step = max(1, at_once)
+    return (slice(first, first + step) for first in range(0, count, step))
 
 
 @dataclass(frozen=True)
@@ -140,31 +161,33 @@ def _texels(page: Page, low: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     areas = sizes.prod(1)
     starts = np.cumsum(areas) - areas
     texels = np.empty((int(areas.sum()), CHANNELS), np.uint8)
+    page_width = page.features_u8.shape[1]
+    features, colors = (whole.reshape(-1, whole.shape[-1]) for whole in (page.features_u8, page.colors_u8))
+    features, colors = (
+        np.ascontiguousarray(whole).view((np.void, whole.shape[1]))[:, 0] for whole in (features, colors)
+    )
     for height, width in np.unique(sizes, axis=0):
-        some = np.flatnonzero((sizes == (height, width)).all(1))
-        rows = low[some, 1][:, None, None] + np.arange(height)[:, None]
-        columns = low[some, 0][:, None, None] + np.arange(width)
-        to = (starts[some][:, None] + np.arange(height * width)).reshape(rows.shape[0], height, width)
-        texels[to, :FEATURE_CHANNELS] = page.features_u8[rows, columns]
-        texels[to, FEATURE_CHANNELS:] = page.colors_u8[rows, columns]
+        equal = np.flatnonzero((sizes == (height, width)).all(1))
+        inside = np.arange(height)[:, None] * page_width + np.arange(width)
+        for part in slices(len(equal), TEXELS_AT_ONCE // (height * width)):
+            some = equal[part]
+            at = (low[some, 1] * page_width + low[some, 0])[:, None] + inside.ravel()
+            to = starts[some][:, None] + np.arange(height * width)
+            texels[to, :FEATURE_CHANNELS] = features[at][..., None].view(np.uint8)
+            texels[to, FEATURE_CHANNELS:] = colors[at][..., None].view(np.uint8)
     return texels
 
 
 def joined(parts: list[Quads]) -> Quads:
-    """All quads of several pages."""
-    shifts = np.cumsum([0, *(len(part.patches.sizes) for part in parts[:-1])])
-    patches = Patches(
-        np.concatenate([part.patches.sizes for part in parts]), np.concatenate([part.patches.texels for part in parts])
-    )
-    return Quads(
-        np.concatenate([part.corners for part in parts]),
-        np.concatenate([part.ends for part in parts]),
-        np.concatenate([part.triangles for part in parts]),
-        np.concatenate([part.patch + shift for part, shift in zip(parts, shifts, strict=True)]),
-        patches,
-    )
-
-
-def opaque_texels(texels: np.ndarray) -> np.ndarray:
-    """[...] bool of texels [..., 11]."""
-    return is_opaque(texels)
+    """All quads of several pages; takes them from the list, so that they are in memory once."""
+    shifts = np.cumsum([0, *(len(part.patches.sizes) for part in parts)])
+    sizes = np.concatenate([part.patches.sizes for part in parts])
+    texels, done = np.empty((int(sizes.prod(1).sum()), CHANNELS), np.uint8), 0
+    others = []
+    for shift in shifts[:-1]:
+        part = parts.pop(0)
+        texels[done : done + len(part.patches.texels)] = part.patches.texels
+        done += len(part.patches.texels)
+        others.append((part.corners, part.ends, part.triangles, part.patch + shift))
+    corners, ends, triangles, patch = map(np.concatenate, zip(*others, strict=True))
+    return Quads(corners, ends, triangles, patch, Patches(sizes, texels))

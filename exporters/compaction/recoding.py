@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.baked import ShaderNetwork
-from core.conventions import FEATURE_CHANNELS, feature_from_byte
+from core.conventions import FEATURE_CHANNELS, feature_from_byte, is_opaque
 from exporters.compaction.surface import SurfacePoints
+from exporters.threads import mapped
 
 # Which of the axes, by rising variance, each channel takes. Channel 0 jumps at holes, so it is the quietest; quiet ones
 # share a texture, which PNG codes with one table; alpha is below the colours, as no premultiplied image's is.
@@ -23,6 +24,7 @@ _LEVELS = 254  # byte 0 of channel 0 is a hole, and one is left for rounding
 _LEAST_SENSITIVITY = 1e-5
 # A channel whose spread is below this share of a step would be rounded to one level nearly everywhere.
 _CARRIES_NOTHING = 0.3
+_ROWS_AT_ONCE = 64  # of a page; 10 MB
 
 
 @dataclass(frozen=True)
@@ -96,12 +98,18 @@ def recoding_of(network: ShaderNetwork, seen: SurfacePoints) -> Recoding:
 
 
 def widened(recoding: Recoding, features_u8: np.ndarray) -> Recoding:
-    """With the range grown to that of these features [n, 8]: what a sample missed."""
-    y = recoding.coordinates(features_u8).astype(np.float64)
+    """With the range grown to that of the opaque ones among these features [h, w, 8]: what a sample missed."""
+
+    def bounds(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        y = recoding.matrix.T.astype(np.float32) @ np.ascontiguousarray(rows[is_opaque(rows)].T).astype(np.float32)
+        y *= 1 / 255  # channels first: ten times as fast
+        return y.min(1, initial=np.inf), y.max(1, initial=-np.inf)
+
+    lows, highs = zip(*mapped(bounds, np.array_split(features_u8, -(-len(features_u8) // _ROWS_AT_ONCE))), strict=True)
     return replace(
         recoding,
-        lowest=np.minimum(recoding.lowest, y.min(0, initial=np.inf)),
-        highest=np.maximum(recoding.highest, y.max(0, initial=-np.inf)),
+        lowest=np.minimum(recoding.lowest, np.min(lows, 0)),
+        highest=np.maximum(recoding.highest, np.max(highs, 0)),
     )
 
 

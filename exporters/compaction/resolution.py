@@ -64,21 +64,20 @@ def size_options(y: np.ndarray, opaque: np.ndarray, most: float, hole_cost: floa
         hole_cost: squared error where a hole is filled or made; infinite: holes stay where they are, and no patch is
             left out.
     """
+    moments = _moments(y, opaque)
     count, height, width = opaque.shape
-    moments = np.empty((height, width, count, y.shape[-1] + 2), np.float32)  # the order that makes `_sums` fast
-    moments[..., :-2] = np.where(opaque[..., None], y, 0).transpose(1, 2, 0, 3)
-    moments[..., -2] = (moments[..., :-2] ** 2).sum(-1)
-    moments[..., -1] = opaque.transpose(1, 2, 0)
     found = [
         (size, *_error_and_texels(sums, size, hole_cost))
         for size, sums in _all_sums(moments, sides(height, most), sides(width, most))
     ]
+    if (sides(height, most)[-1], sides(width, most)[-1]) == (height, width):  # the patch as it is
+        found.append(((height, width), np.zeros(count, np.float32), opaque.sum((1, 2), dtype=np.float32)))
     sizes, errors, texels = zip(*found, strict=True)
     if np.isinf(hole_cost):  # what is lost by the largest size allowed cannot be helped
         errors = (*errors[:-1], np.where(np.isfinite(errors[-1]), errors[-1], 0))
     else:
         sizes, texels = ((0, 0), *sizes), (np.zeros(count, np.float32), *texels)
-        left_out = hole_cost * _sums(moments[..., -1:], (1, 1))[0, 0, :, 0]
+        left_out = hole_cost * _sums(moments[:, :, -1:], (1, 1))[0, 0, 0]
         errors = (left_out + errors[-1], *errors)
     return SizeOptions(np.array(sizes), np.stack(errors) - errors[-1], np.stack(texels))
 
@@ -89,8 +88,7 @@ def shrunk(values: np.ndarray, opaque: np.ndarray, size: tuple[int, int]) -> tup
     Returns:
         means over the opaque part [n, h', w', c] (0 where there is none), opacity [n, h', w'].
     """
-    weighted = np.concatenate([values * opaque[..., None], opaque[..., None].astype(np.float32)], -1)
-    sums = _sums(np.ascontiguousarray(weighted.transpose(1, 2, 0, 3)), size).transpose(2, 0, 1, 3)
+    sums = _sums(_with_patches_last(values, opaque, 1), size).transpose(3, 0, 1, 2)
     solid = sums[..., -1] > 0.5 * _cells(size)
     means = sums[..., :-1] / np.maximum(sums[..., -1:], 1e-6)
     return np.where(solid[..., None], means, 0), solid
@@ -118,28 +116,49 @@ def _starts(side: int) -> np.ndarray:
     return np.clip((np.arange(side + 1) - 0.5) / (side - 1), 0.0, 1.0)
 
 
+def _moments(y: np.ndarray, opaque: np.ndarray) -> np.ndarray:
+    """[h, w, 8 + 2, n]: of what is opaque the features, their square, and 1."""
+    moments = _with_patches_last(y, opaque, 2)
+    np.square(moments[:, :, :-2]).sum(2, out=moments[:, :, -2])
+    return moments
+
+
+def _with_patches_last(values: np.ndarray, opaque: np.ndarray, more: int) -> np.ndarray:
+    """float32 [h, w, c + more, n] of values [n, h, w, c], 0 in holes; the last channel is the opacity.
+
+    In this order, sums and products run along memory.
+    """
+    solid = opaque.transpose(1, 2, 0)
+    result = np.empty((*solid.shape[:2], values.shape[-1] + more, solid.shape[2]), np.float32)
+    np.multiply(values.transpose(1, 2, 3, 0), solid[:, :, None], out=result[:, :, :-more])
+    result[:, :, -1] = solid
+    return result
+
+
 def _error_and_texels(sums: np.ndarray, size: tuple[int, int], hole_cost: float) -> tuple[np.ndarray, np.ndarray]:
-    """(squared error [n], opaque texels [n]) of patches' sums [h', w', n, 10]."""
-    covered, whole = sums[..., -1], _cells(size)[..., None]
+    """(squared error [n], opaque texels [n]) of patches' sums [h', w', 10, n]."""
+    covered, whole = sums[:, :, -1], _cells(size)[..., None]
     solid = covered > 0.5 * whole
-    spread = sums[..., -2] - (sums[..., :-2] ** 2).sum(-1) / np.maximum(covered, 1e-6)
-    error = np.where(solid, np.maximum(spread, 0.0), 0.0).sum((0, 1))
+    spread = sums[:, :, -2] - np.square(sums[:, :, :-2]).sum(2) / np.maximum(covered, 1e-6)
+    error = (np.maximum(spread, 0.0) * solid).sum((0, 1))
     moved = np.where(solid, whole - covered, covered).sum((0, 1))
     error += np.where(moved > 1e-4, np.inf, 0.0) if np.isinf(hole_cost) else hole_cost * moved
-    return error.astype(np.float32), solid.sum((0, 1)).astype(np.float32)
+    return error.astype(np.float32), solid.sum((0, 1), dtype=np.float32)
 
 
 def _all_sums(
     values: np.ndarray, heights: list[int], widths: list[int]
 ) -> Iterator[tuple[tuple[int, int], np.ndarray]]:
+    """Sums for each pair of sides in turn, but not for the size that the values have."""
     for height in heights:
         rows = _along_rows(values, height)
         for width in widths:
-            yield (height, width), _along_columns(rows, width)
+            if (height, width) != values.shape[:2]:
+                yield (height, width), _along_columns(rows, width)
 
 
 def _sums(values: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """[h', w', n, c] of [h, w, n, c]: integrals over the texels of another size."""
+    """[h', w', c, n] of [h, w, c, n]: integrals over the texels of another size."""
     return _along_columns(_along_rows(values, size[0]), size[1])
 
 
@@ -150,9 +169,9 @@ def _along_rows(values: np.ndarray, height: int) -> np.ndarray:
 
 
 def _along_columns(values: np.ndarray, width: int) -> np.ndarray:
-    height, before, count, channels = values.shape
+    height, before, *rest = values.shape
     sums: np.ndarray = overlaps(width, before) @ values.reshape(height, before, -1)
-    return sums.reshape(height, width, count, channels)
+    return sums.reshape(height, width, *rest)
 
 
 def _cells(size: tuple[int, int]) -> np.ndarray:

@@ -1,11 +1,13 @@
 """What can go without changing what any lookup finds."""
 
+from hashlib import blake2b
+
 import numpy as np
 
 from core.conventions import is_opaque
-from exporters.compaction.quads import CHANNELS, Patches, Quads
+from exporters.compaction.quads import CHANNELS, TEXELS_AT_ONCE, Patches, Quads, slices
 
-TEXELS_AT_ONCE = 1 << 20
+DIGEST_BYTES = 16  # two different patches never meet
 
 
 def without_empty(quads: Quads) -> Quads:
@@ -19,43 +21,53 @@ def without_empty(quads: Quads) -> Quads:
 def with_constant_axes_collapsed(patches: Patches) -> Patches:
     """A patch whose rows (columns) are all equal has one: every lookup finds the same."""
     sizes = patches.sizes.copy()
-    for numbers, texels in patches.by_size(TEXELS_AT_ONCE):
-        sizes[numbers, 0] = np.where((texels == texels[:, :1]).all((1, 2, 3)), 1, sizes[numbers, 0])
-        sizes[numbers, 1] = np.where((texels == texels[:, :, :1]).all((1, 2, 3)), 1, sizes[numbers, 1])
-    return patches if np.array_equal(sizes, patches.sizes) else cropped(patches, sizes)
+    for numbers in patches.groups(TEXELS_AT_ONCE):
+        texels = patches.content(numbers)
+        sizes[numbers, 0] = np.where(_all_equal(texels), 1, sizes[numbers, 0])
+        sizes[numbers, 1] = np.where(_all_equal(texels.swapaxes(1, 2)), 1, sizes[numbers, 1])
+    return patches if np.array_equal(sizes, patches.sizes) else cropped(patches, np.arange(len(sizes)), sizes)
 
 
-def cropped(patches: Patches, sizes: np.ndarray) -> Patches:
-    """The first rows and columns of each patch, `sizes` [N, 2] of them."""
+def _all_equal(texels: np.ndarray) -> np.ndarray:
+    """[n] bool: along axis 1 of [n, h, w, c]. Most patches show at their ends that they are not."""
+    equal: np.ndarray = (texels[:, -1] == texels[:, 0]).all((1, 2))
+    some = np.flatnonzero(equal)
+    equal[some] = (texels[some] == texels[some, :1]).all((1, 2, 3))
+    return equal
+
+
+def cropped(patches: Patches, numbers: np.ndarray, sizes: np.ndarray) -> Patches:
+    """The first rows and columns of patches `numbers` [n], `sizes` [n, 2] of them."""
     result = Patches(sizes, np.empty((int(sizes.prod(1).sum()), CHANNELS), np.uint8))
-    offsets = result.offsets
-    for numbers, texels in patches.by_size(TEXELS_AT_ONCE):
-        for height, width in np.unique(sizes[numbers], axis=0):
-            here = (sizes[numbers] == (height, width)).all(1)
-            to = offsets[numbers[here]][:, None] + np.arange(height * width)
-            result.texels[to] = texels[here, :height, :width].reshape(-1, height * width, CHANNELS)
+    both = np.concatenate([patches.sizes[numbers], sizes], 1)
+    for before in np.unique(both, axis=0):
+        equal = np.flatnonzero((both == before).all(1))
+        height, width = before[2:]
+        for part in slices(len(equal), TEXELS_AT_ONCE // int(before[:2].prod())):
+            texels = patches.content(numbers[equal[part]])[:, :height, :width]
+            result.place(equal[part], texels)
     return result
 
 
 def with_equal_patches_shared(quads: Quads) -> Quads:
-    """Only the patches in use, each once, in the order of their first use."""
-    patches = quads.patches
-    raw, areas = patches.texels.reshape(-1).data, patches.areas
-    starts, ends = (CHANNELS * patches.offsets).tolist(), (CHANNELS * (patches.offsets + areas)).tolist()
-    heights = patches.sizes[:, 0].tolist()
-    numbers: dict[tuple[int, bytes], int] = {}  # by height and content: the new number
-    new, kept = np.full(len(areas), -1), list[int]()
-    for old in quads.patch.tolist():
-        if new[old] < 0:
-            key = (heights[old], bytes(raw[starts[old] : ends[old]]))
-            new[old] = numbers.setdefault(key, len(numbers))
-            if new[old] == len(kept):
-                kept.append(old)
-    return Quads(quads.corners, quads.ends, quads.triangles, new[quads.patch], _chosen(patches, np.array(kept)))
-
-
-def _chosen(patches: Patches, numbers: np.ndarray) -> Patches:
-    sizes = patches.sizes[numbers]
-    areas = sizes.prod(1)
-    within = np.arange(int(areas.sum())) - np.repeat(np.cumsum(areas) - areas, areas)
-    return Patches(sizes, patches.texels[np.repeat(patches.offsets[numbers], areas) + within])
+    """Only the patches in use, each once, in their order."""
+    patches, (in_use, number) = quads.patches, np.unique(quads.patch, return_inverse=True)
+    raw = patches.texels.reshape(-1).data
+    ends = CHANNELS * (patches.offsets + patches.areas)
+    texts = zip(
+        patches.sizes[in_use, 0].tolist(),
+        (CHANNELS * patches.offsets[in_use]).tolist(),
+        ends[in_use].tolist(),
+        strict=True,
+    )
+    found: dict[tuple[int, bytes], int] = {}  # by height and content: the new number
+    new, kept = np.empty(len(in_use), np.int64), list[int]()
+    for old, (height, start, end) in enumerate(texts):
+        key = (height, blake2b(raw[start:end], digest_size=DIGEST_BYTES).digest())
+        new[old] = found.setdefault(key, len(found))
+        if new[old] == len(kept):
+            kept.append(old)
+    if len(kept) < len(patches.sizes):
+        numbers = in_use[kept]
+        patches = cropped(patches, numbers, patches.sizes[numbers])
+    return Quads(quads.corners, quads.ends, quads.triangles, new[number], patches)

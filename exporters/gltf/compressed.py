@@ -1,7 +1,6 @@
 """EXT_meshopt_compression, KHR_mesh_quantization and EXT_texture_webp: what browsers load, in the fewest bytes."""
 
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import meshopt
@@ -13,8 +12,9 @@ from exporters.gltf.blob import ALIGNMENT, Blob
 from exporters.gltf.document import WEBP
 from exporters.gltf.meshopt_codec import MESHOPT, Mode
 from exporters.gltf.quantization import steps_of
-from exporters.gltf.storage import NamedImage, accessor, corners, index_types, primitive
-from exporters.png import encode_png
+from exporters.gltf.storage import IMAGES_PER_PAGE, NamedImage, accessor, corners, index_types, primitive
+from exporters.png import encode_png, middle_band
+from exporters.threads import mapped
 from exporters.webp import QUICK_FROM_TEXELS, encode_webp
 
 QUANTIZATION = "KHR_mesh_quantization"
@@ -36,8 +36,8 @@ class CompressedStorage:
         self._quantised, self._decoded_length, self._webp = quantised, 0, False
 
     def add_textures(self, document: gltf.GLTF2, images: Sequence[NamedImage]) -> None:
-        with ThreadPoolExecutor() as pool:
-            files = list(pool.map(_smallest, images))
+        texels = sum(image.pixels.shape[0] * image.pixels.shape[1] for image in images) // IMAGES_PER_PAGE
+        files = mapped(_coding(quick=texels > QUICK_FROM_TEXELS), images)
         for image, (kind, data) in zip(images, files, strict=True):
             view = self.blob.append(data)
             document.images.append(gltf.Image(name=image.name, mimeType=f"image/{kind}", bufferView=view))
@@ -134,9 +134,17 @@ def decoded_exponential(rows: np.ndarray) -> np.ndarray:
     return np.ldexp(mantissa.astype(np.float32), exponent)
 
 
-def _smallest(image: NamedImage) -> tuple[str, bytes]:
-    """("webp" or "png", the file)."""
-    height, width = image.pixels.shape[:2]
-    webp = encode_webp(image.pixels, exact=image.exact, quick=height * width > QUICK_FROM_TEXELS)
-    png = encode_png(image.pixels)
-    return ("webp", webp) if len(webp) < len(png) else ("png", png)
+def _coding(*, quick: bool) -> Callable[[NamedImage], tuple[str, bytes]]:
+    """Makes of an image ("webp" or "png", the file): what is smaller on its middle rows."""
+
+    def webp(image: NamedImage, pixels: np.ndarray) -> tuple[str, bytes]:
+        return "webp", encode_webp(pixels, exact=image.exact, quick=quick)
+
+    def smallest(image: NamedImage) -> tuple[str, bytes]:
+        band = middle_band(image.pixels)
+        best = min(webp(image, band), ("png", encode_png(band)), key=lambda file: len(file[1]))
+        if len(band) == len(image.pixels):
+            return best
+        return webp(image, image.pixels) if best[0] == "webp" else ("png", encode_png(image.pixels))
+
+    return smallest

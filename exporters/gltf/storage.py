@@ -11,6 +11,7 @@ from exporters.gltf.blob import Blob
 from exporters.png import encode_pngs
 
 ImageStore = Callable[[str, bytes], gltf.Image]  # takes a PNG by its name; the glTF image that refers to it
+IMAGES_PER_PAGE = 3  # features 0-3, features 4-7, fallback colour
 PRIMITIVE_RESTART_U16 = 65535  # an index that glTF forbids
 
 

@@ -16,7 +16,7 @@ from exporters.gltf.compressed import CompressedStorage
 from exporters.gltf.placement import nearest_rotation, trs
 from exporters.gltf.provenance import Provenance, add_provenance
 from exporters.gltf.quantization import quantised
-from exporters.gltf.storage import NamedImage, PlainStorage, Storage
+from exporters.gltf.storage import IMAGES_PER_PAGE, NamedImage, PlainStorage, Storage
 from exporters.limits import check_size
 from exporters.numbers import column_major
 
@@ -25,7 +25,6 @@ WEB_NAME = "scene.web.glb"
 LQ_NAME = "scene.lq.glb"
 GLTF_NAME = "scene.gltf"
 BUFFER_NAME = "scene.bin"
-IMAGES_PER_PAGE = 3  # features 0-3, features 4-7, fallback colour
 ALPHA_CUTOFF = 0.5
 
 

@@ -11,6 +11,7 @@ import argparse
 import gc
 import sys
 import time
+from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -59,9 +60,9 @@ class ExportRow:
 def measured(name: str, scene_file: Path | None) -> ExportRow:
     """Writes one format, in this process."""
     scene = _scene(scene_file)
-    about = f"{scene.triangle_count} triangles, " + ", ".join(
-        f"{page.features_u8.shape[1]} x {page.features_u8.shape[0]}" for page in scene.pages
-    )
+    sizes = Counter("{1} x {0}".format(*page.features_u8.shape) for page in scene.pages)
+    pages = ", ".join(f"{count} of {size} texels" for size, count in sizes.items())
+    about = f"{scene.triangle_count} triangles; pages: {pages}"
     gc.collect()
     started, busy = time.perf_counter(), time.process_time()
     data = FORMATS[name].write(Source(scene))

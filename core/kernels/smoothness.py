@@ -1,4 +1,4 @@
-"""The pull of a grid's features towards their neighbours: the gradient of core/oracles/smoothness.py."""
+"""The pull of features towards their neighbours', in a grid and in patches: gradients of core/oracles/smoothness.py."""
 
 import warp as wp
 
@@ -36,3 +36,40 @@ def smoothness_gradient(
                 pull += features[i] - features[i + stride]
         stride *= nodes
     grad_features[0, row] += weight * pull
+
+
+@wp.kernel
+def texel_smoothness_gradient(
+    first: int,
+    touched: wp.array2d(dtype=wp.int32),  # [parts, capacity]
+    stamp: wp.array2d(dtype=wp.int32),  # [parts, texels]: the last batch that touched a texel
+    batch: int,
+    part: int,
+    K: int,  # texels a side of a patch
+    weight: float,
+    alpha: wp.array(dtype=float),  # [texels]
+    features: wp.array(dtype=vec8),  # [texels]
+    grad_features: wp.array2d(dtype=vec8),  # [parts, texels]
+):
+    """Adds the gradient of the texels on one part's list, except those that an earlier part lists too.
+
+    Neighbours share a side and a patch, and both are opaque: what is in holes means nothing.
+    """
+    i = touched[part, first + wp.tid()]
+    for p in range(part):
+        if stamp[p, i] == batch:
+            return
+    if alpha[i] <= 0.5:
+        return
+    pull = vec8()
+    stride = int(1)
+    for _axis in range(2):
+        place = (i // stride) % K
+        if place > 0:  # noqa: SIM102
+            if alpha[i - stride] > 0.5:
+                pull += features[i] - features[i - stride]
+        if place < K - 1:  # noqa: SIM102
+            if alpha[i + stride] > 0.5:
+                pull += features[i] - features[i + stride]
+        stride *= K
+    grad_features[part, i] += weight * pull

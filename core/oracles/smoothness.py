@@ -1,6 +1,18 @@
-"""How unlike neighbouring entries of a grid are."""
+"""How unlike neighbours are: entries of a grid, texels of a patch."""
 
 from torch import Tensor
+
+
+def patch_smoothness_loss(features: Tensor, opaque: Tensor) -> Tensor:
+    """Half the sum of squared differences over all pairs of texels with a common side that are both opaque.
+
+    Args:
+        features: [q, K, K, c], of q patches.
+        opaque: [q, K, K] bool.
+    """
+    rows, columns = features[:, 1:] - features[:, :-1], features[:, :, 1:] - features[:, :, :-1]
+    both = opaque[:, 1:] & opaque[:, :-1], opaque[:, :, 1:] & opaque[:, :, :-1]
+    return ((rows[both[0]] ** 2).sum() + (columns[both[1]] ** 2).sum()) / 2.0
 
 
 def smoothness_loss(features: Tensor, trained: Tensor) -> Tensor:

@@ -17,6 +17,7 @@ from core.field.parameters import Parameters
 from core.field.space import Space
 from core.kernels.adam import adam_texels
 from core.kernels.launch import launch
+from core.kernels.smoothness import texel_smoothness_gradient
 from core.kernels.surfaces import TEXEL_KERNELS, TexelGradients, Texels
 from core.kernels.types import vec8
 from core.mesh.quad_mesh import QuadMesh, patch_weights
@@ -31,6 +32,7 @@ FEATURE_RATE, ALPHA_RATE, NETWORK_RATE = 0.01, 0.015, 2e-3
 FINAL_RATE = 0.1
 CONTINUOUS_UNTIL, OPACITY_UNTIL = 0.4, 0.75  # of the steps
 LEAST_BINARY_SHARE = 0.3
+SMOOTHNESS = 0.01  # docs/training.md
 SUBRAYS = 4
 HIT_CAPACITY = 24
 QUADS_AT_ONCE = 20_000
@@ -120,6 +122,7 @@ class TexelStage(Stage):
         soft, hard = (tuple(self.gradient(x, len(A)) for x in pair) for pair in ((F, A), (F_binary, A_binary)))
         gradients = self._kernel_gradients(with_alpha)
         self._tracer.backward(batch, self._texels, soft, hard, gradients, self.parameters.parts)
+        self._smooth()
         self._adam(ALPHA_RATE * falling if with_alpha else 0.0, FEATURE_RATE * falling)
         return color_error(color, A_binary, batch.color, batch.alpha)
 
@@ -133,12 +136,22 @@ class TexelStage(Stage):
         gradients.batch, gradients.with_alpha = self.done, int(with_alpha)
         return gradients
 
+    def _smooth(self) -> None:
+        """Adds the gradient of the touched texels' smoothness."""
+        texels, gradient = self._texels, wp.from_torch(self.parameters.gradients[1], dtype=vec8)
+        for part, (count, listed) in enumerate(self._lists()):
+            inputs = [*listed, part, texels.K, SMOOTHNESS, texels.alpha, texels.features, gradient]
+            launch(texel_smoothness_gradient, count, inputs, self.device)
+
     def _adam(self, alpha_rate: float, feature_rate: float) -> None:
-        touched, stamp = wp.from_torch(self._touched), wp.from_torch(self._stamp)
         state = [self.parameters.scalar_state(), self.parameters.feature_state(), wp.from_torch(self._updates)]
-        for part, count in enumerate(self._touched_count.tolist()):
-            inputs = [touched, stamp, self.done, part, *state, alpha_rate, feature_rate]
-            launch(adam_texels, count, inputs, self.device)
+        for part, (count, listed) in enumerate(self._lists()):
+            launch(adam_texels, count, [*listed, part, *state, alpha_rate, feature_rate], self.device)
+
+    def _lists(self) -> list[tuple[int, list[Any]]]:
+        """(length, inputs of kernels that go through it) of each part's list of touched texels."""
+        listed = [wp.from_torch(self._touched), wp.from_torch(self._stamp), self.done]
+        return [(count, listed) for count in self._touched_count.tolist()]
 
     def own_state(self) -> dict[str, Any]:
         return {

@@ -1,7 +1,8 @@
 """Stage 2b: the texels themselves. What is trained here is what is shipped.
 
 Four sub-rays a pixel look up the nearest texel, as the viewer will. Both models at first, then the binary one alone,
-and in the end with opacity frozen (eq. 21).
+and in the end with opacity frozen (eq. 21). Texels that few rays meet would keep what is noise in these: each is pulled
+towards its neighbours a little.
 """
 
 from typing import Any

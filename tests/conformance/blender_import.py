@@ -7,7 +7,10 @@ import json
 import sys
 
 import bpy
+import mathutils
 import numpy as np
+
+DISTANCE = 1.4  # of a camera from the scene's middle, in diagonals of its box
 
 
 def main(asset: str, picture: str, width: str, height: str) -> None:
@@ -17,9 +20,9 @@ def main(asset: str, picture: str, width: str, height: str) -> None:
     else:
         bpy.ops.wm.usd_import(filepath=asset, import_cameras=True)
     cameras = sorted((o for o in bpy.data.objects if o.type == "CAMERA"), key=lambda o: o.name)
-    if cameras:
-        render(cameras, picture, int(width), int(height))
-    print("REPORT " + json.dumps({"bounds": bounds(), "cameras": len(cameras), "textures": textures()}))
+    report = {"bounds": bounds(), "cameras": len(cameras), "textures": textures()}
+    render(cameras or [camera_around(*map(np.array, bounds()))], picture, int(width), int(height))
+    print("REPORT " + json.dumps(report))
 
 
 def bounds() -> list[list[float]]:
@@ -33,6 +36,16 @@ def bounds() -> list[list[float]]:
             points.append(local.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3])
     everything = np.concatenate(points)
     return [everything.min(0).tolist(), everything.max(0).tolist()]
+
+
+def camera_around(low: np.ndarray, high: np.ndarray) -> bpy.types.Object:
+    """A camera that looks down a little on all that is between two corners."""
+    direction = np.array([0.55, -0.72, 0.42]) / np.linalg.norm([0.55, -0.72, 0.42])
+    camera = bpy.data.objects.new("around", bpy.data.cameras.new("around"))
+    camera.location = (low + high) / 2 + DISTANCE * np.linalg.norm(high - low) * direction
+    camera.rotation_euler = mathutils.Vector(-direction).to_track_quat("-Z", "Y").to_euler()
+    bpy.context.scene.collection.objects.link(camera)
+    return camera
 
 
 def textures() -> dict[str, list[str]]:

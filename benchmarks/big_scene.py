@@ -1,8 +1,8 @@
 """A scene as large as assets get: 220,000 triangles on four pages of 4096², as trained ones look to a compressor.
 
 Quads are cells of a sphere's surface, in layers; each has a patch of its own. Features change smoothly over a patch and
-carry noise, a quarter of the quads are cut by an outline, and colours follow features. With `NOISE`, plain PNG takes as
-many bits a texel as on lego at 400 px, where optimisers leave texels noisy.
+carry noise, a quarter of the quads are cut by an outline, and colours follow features. With `NOISE`, scene.glb takes 9
+bytes a texel of its patches, as it does on lego at 400 px, where optimisers leave texels noisy.
 """
 
 import numpy as np

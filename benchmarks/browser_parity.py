@@ -10,29 +10,22 @@ With --out, writes the renderings, their differences (32 times enlarged) and the
 import argparse
 import json
 import sys
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
+from benchmarks.parity import DIFFERENCE_GAIN, REFERENCES
 from core.baked import BakedScene
 from core.camera import Camera
 from core.datasets import read_capture
-from core.render.reference import render_deferred, render_forward
 from exporters.gltf import read_glb
 from tests.browser.chromium import missing, running_browser
 from tests.browser.site import running_site
 from tests.browser.viewer import ViewerPage, open_viewer
 from tests.parity.compare import Comparison, compare, pixels_with_edges
 
-Renderer = Callable[[BakedScene, Camera], np.ndarray]
-REFERENCES: dict[str, Renderer] = {
-    "deferred": render_deferred,
-    "forward": render_forward,
-}
-DIFFERENCE_GAIN = 32  # makes one step of 8 bits visible
 RENDERER_NAME = """() => {
   const gl = polyfield.stage.webgl.getContext();
   return gl.getParameter(gl.getExtension("WEBGL_debug_renderer_info").UNMASKED_RENDERER_WEBGL);

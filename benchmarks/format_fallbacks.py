@@ -16,7 +16,7 @@ from core.camera import Camera
 from core.capture import View
 from core.metrics import psnr
 from core.render.composite import over, quantised
-from core.render.visibility import SUBPIXELS_PER_SIDE, subpixel_camera
+from core.render.visibility import pixel_means, subpixel_camera
 from exporters.usd import write_usd
 from exporters.usd.quicklook import write_quicklook
 from tests.parity.gl_matrices import in_asset
@@ -107,10 +107,6 @@ def _in_frame(render: Draw, asset_from_object: np.ndarray) -> Draw:
     """`render` takes cameras of the asset's frame and has one sample a pixel; the result has four."""
 
     def draw(camera: Camera) -> np.ndarray:
-        samples = render(in_asset(subpixel_camera(camera), asset_from_object))
-        width, height = camera.size_px
-        side = SUBPIXELS_PER_SIDE
-        image: np.ndarray = samples.reshape(height, side, width, side, 4).mean((1, 3))
-        return image
+        return pixel_means(render(in_asset(subpixel_camera(camera), asset_from_object)))
 
     return draw

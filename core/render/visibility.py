@@ -45,3 +45,11 @@ def subpixel_camera(camera: Camera) -> Camera:
     """The same view with a pixel for every sub-pixel: its pixel centres are the sub-pixels' positions."""
     width, height = camera.size_px
     return camera.resized((width * SUBPIXELS_PER_SIDE, height * SUBPIXELS_PER_SIDE))
+
+
+def pixel_means(samples: np.ndarray) -> np.ndarray:
+    """[h, w, c]: the mean of each pixel's sub-pixels, of what a `subpixel_camera` sees [2 h, 2 w, c]."""
+    height, width, channels = samples.shape
+    side = SUBPIXELS_PER_SIDE
+    means: np.ndarray = samples.reshape(height // side, side, width // side, side, channels).mean((1, 3))
+    return means

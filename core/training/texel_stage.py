@@ -37,6 +37,7 @@ SMOOTHNESS = 0.01  # docs/training.md
 SUBRAYS = 4
 HIT_CAPACITY = 24
 QUADS_AT_ONCE = 20_000
+Lists = list[tuple[int, list[Any]]]  # (length, inputs of kernels that go through it) of each part's touched texels
 
 
 class TexelStage(Stage):
@@ -123,8 +124,9 @@ class TexelStage(Stage):
         soft, hard = (tuple(self.gradient(x, len(A)) for x in pair) for pair in ((F, A), (F_binary, A_binary)))
         gradients = self._kernel_gradients(with_alpha)
         self._tracer.backward(batch, self._texels, soft, hard, gradients, self.parameters.parts)
-        self._smooth()
-        self._adam(ALPHA_RATE * falling if with_alpha else 0.0, FEATURE_RATE * falling)
+        lists = self._lists()
+        self._smooth(lists)
+        self._adam(lists, ALPHA_RATE * falling if with_alpha else 0.0, FEATURE_RATE * falling)
         return color_error(color, A_binary, batch.color, batch.alpha)
 
     def _kernel_gradients(self, with_alpha: bool) -> TexelGradients:
@@ -137,20 +139,20 @@ class TexelStage(Stage):
         gradients.batch, gradients.with_alpha = self.done, int(with_alpha)
         return gradients
 
-    def _smooth(self) -> None:
+    def _smooth(self, lists: Lists) -> None:
         """Adds the gradient of the touched texels' smoothness."""
         texels, gradient = self._texels, wp.from_torch(self.parameters.gradients[1], dtype=vec8)
-        for part, (count, listed) in enumerate(self._lists()):
+        for part, (count, listed) in enumerate(lists):
             inputs = [*listed, part, texels.K, SMOOTHNESS, texels.alpha, texels.features, gradient]
             launch(texel_smoothness_gradient, count, inputs, self.device)
 
-    def _adam(self, alpha_rate: float, feature_rate: float) -> None:
+    def _adam(self, lists: Lists, alpha_rate: float, feature_rate: float) -> None:
         state = [self.parameters.scalar_state(), self.parameters.feature_state(), wp.from_torch(self._updates)]
-        for part, (count, listed) in enumerate(self._lists()):
+        for part, (count, listed) in enumerate(lists):
             launch(adam_texels, count, [*listed, part, *state, alpha_rate, feature_rate], self.device)
 
-    def _lists(self) -> list[tuple[int, list[Any]]]:
-        """(length, inputs of kernels that go through it) of each part's list of touched texels."""
+    def _lists(self) -> Lists:
+        """Of the texels that the last backward pass touched. Waits for it."""
         listed = [wp.from_torch(self._touched), wp.from_torch(self._stamp), self.done]
         return [(count, listed) for count in self._touched_count.tolist()]
 

@@ -18,7 +18,6 @@ from exporters.compaction.surface import surface_points
 from exporters.threads import mapped
 
 T = TypeVar("T")
-TEXELS_AT_ONCE = 1 << 18  # 10 MB of moments; with less, small steps wait for each other
 SAMPLE_POINTS = 40_000
 SAMPLE_QUADS = 8_000
 SEARCH_STEPS = 14
@@ -150,7 +149,7 @@ class _Sample:
         for quads in parts:
             here = numbers[(numbers >= first) & (numbers < first + len(quads))] - first
             weight, first = _patch_weights(quads, mean), first + len(quads)
-            for some in quads.patches.groups(TEXELS_AT_ONCE, np.unique(quads.patch[here])):
+            for some in quads.patches.groups(np.unique(quads.patch[here])):
                 features = quads.patches.content(some)[..., :FEATURE_CHANNELS]
                 y, opaque = recoding.coordinates(features), is_opaque(features)
                 self._options.append((size_options(y, opaque, quality.most, quality.hole_cost), weight[some]))
@@ -221,7 +220,7 @@ def _reduced(quads: Quads, mean_area: float, recoding: Recoding, trade: Trade, q
             found.append((some[here], _bytes(*part, recoding, quality)))
         return found
 
-    parts = [part for group in mapped(reduced, quads.patches.groups(TEXELS_AT_ONCE)) for part in group]
+    parts = [part for group in mapped(reduced, quads.patches.groups()) for part in group]
     if not parts:
         return None
     order = np.concatenate([numbers for numbers, _ in parts])

@@ -4,7 +4,7 @@ import numpy as np
 
 from core.baked import Page
 from core.conventions import FEATURE_CHANNELS, MAX_PAGE_SIZE_PX
-from exporters.compaction.quads import CHANNELS, TEXEL, TEXELS_AT_ONCE, Patches, Quads
+from exporters.compaction.quads import CHANNELS, TEXEL, Patches, Quads
 
 # What a further page has to save: each costs a draw call and three textures.
 WORTH_A_PAGE = 1 << 19  # texels, 6 MB on the graphics processor
@@ -95,7 +95,7 @@ def _page(
 ) -> Page:
     image = np.zeros((*size, CHANNELS), np.uint8)
     sizes = patches.sizes[numbers]
-    for some in patches.groups(TEXELS_AT_ONCE, numbers):
+    for some in patches.groups(numbers):
         texels, (top, left) = patches.content(some), places[slot[some]].T
         rows = top[:, None, None] + np.arange(texels.shape[1])[:, None]
         columns = left[:, None, None] + np.arange(texels.shape[2])

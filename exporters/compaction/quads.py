@@ -16,7 +16,7 @@ CHANNELS = FEATURE_CHANNELS + 3  # features, then the fallback's colour
 # How far, in texels, a corner may be from a texel's centre: float32 on 4096 texels gives 2e-4, other tools' decimals
 # 2e-3.
 OFF_CENTRE = 0.01
-TEXELS_AT_ONCE = 1 << 18  # 3 MB, and indices
+TEXELS_AT_ONCE = 1 << 18  # 3 MB, or 10 MB of moments; with less, small steps of threads wait for each other
 TEXEL = np.dtype((np.void, CHANNELS))  # copied as a whole: several times faster than channel by channel
 
 
@@ -42,8 +42,8 @@ class Patches:
         offsets: np.ndarray = np.cumsum(self.areas) - self.areas
         return offsets
 
-    def groups(self, most_texels: int, numbers: np.ndarray | None = None) -> Iterator[np.ndarray]:
-        """Numbers [n] of patches of one size, about `most_texels` texels at a time.
+    def groups(self, numbers: np.ndarray | None = None) -> Iterator[np.ndarray]:
+        """Numbers [n] of patches of one size, about TEXELS_AT_ONCE texels at a time.
 
         Args:
             numbers: the patches to go through; None: all.
@@ -52,7 +52,7 @@ class Patches:
         sizes = self.sizes[numbers]
         for height, width in np.unique(sizes, axis=0):
             equal = numbers[(sizes == (height, width)).all(1)]
-            yield from (equal[part] for part in slices(len(equal), most_texels // (height * width)))
+            yield from (equal[part] for part in slices(len(equal), TEXELS_AT_ONCE // (height * width)))
 
     def content(self, numbers: np.ndarray) -> np.ndarray:
         """Texels [n, h, w, 11] of patches of one size; not to be written to."""

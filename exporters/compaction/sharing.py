@@ -21,7 +21,7 @@ def without_empty(quads: Quads) -> Quads:
 def with_constant_axes_collapsed(patches: Patches) -> Patches:
     """A patch whose rows (columns) are all equal has one: every lookup finds the same."""
     sizes = patches.sizes.copy()
-    for numbers in patches.groups(TEXELS_AT_ONCE):
+    for numbers in patches.groups():
         texels = patches.content(numbers)
         sizes[numbers, 0] = np.where(_all_equal(texels), 1, sizes[numbers, 0])
         sizes[numbers, 1] = np.where(_all_equal(texels.swapaxes(1, 2)), 1, sizes[numbers, 1])

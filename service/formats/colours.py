@@ -14,7 +14,7 @@ from core.baked import LAYER_SHAPES, BakedScene, Page, ShaderNetwork
 from core.camera import Camera
 from core.conventions import FEATURE_CHANNELS
 from core.render.raster import Rasteriser
-from core.render.visibility import SUBPIXELS_PER_SIDE, Visibility, subpixel_camera
+from core.render.visibility import Visibility, pixel_means, subpixel_camera
 
 ALPHA_CUTOFF_U8 = 128  # as glTF's alphaCutoff and USD's opacityThreshold of a half
 SAMPLES_AT_ONCE = 1 << 18  # 100 MB of intermediate results
@@ -83,10 +83,7 @@ class ColourRenderer:
             for part in np.array_split(np.arange(len(rows)), len(rows) // SAMPLES_AT_ONCE + 1):
                 at = rows[part], columns[part]
                 rgba[(*at, slice(3))] = self._colors(number, seen, samples, at) / 255.0
-        width, height = camera.size_px
-        side = SUBPIXELS_PER_SIDE
-        image: np.ndarray = rgba.reshape(height, side, width, side, 4).mean((1, 3))
-        return image
+        return pixel_means(rgba)
 
     def _colors(self, number: int, seen: Visibility, camera: Camera, at: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         """[n, 3] in 0..255 of samples (row, column) that see page `number`."""

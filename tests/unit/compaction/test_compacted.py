@@ -8,7 +8,7 @@ import pytest
 from core.baked import BakedScene
 from core.conventions import is_opaque
 from core.render.reference import render_deferred
-from exporters.compaction import PHONE, WEB, Quality, compacted
+from exporters.compaction import PHONE, WEB, Quality, compacted, repacked
 from exporters.compaction.compaction import rounded_colors
 from exporters.compaction.filling import filled, nearest_known
 from tests.scenes import random_network, random_scene
@@ -121,3 +121,9 @@ def test_nearest_known_is_nearest(rng: np.random.Generator) -> None:
         for place in range(9):
             distance = np.abs(at - place).min() if len(at) else 0
             assert abs(int(nearest[place]) - place) == distance
+
+
+def test_scene_of_which_nothing_is_worth_its_bytes_stays_whole(scene: BakedScene) -> None:
+    after = compacted(scene, replace(PHONE, hole_cost=0.0))
+    assert after.quad_count == repacked(scene).quad_count
+    np.testing.assert_array_equal(after.pages[0].features_u8, repacked(scene).pages[0].features_u8)

@@ -6,6 +6,7 @@ Entries that no ray touched keep their moments: an update without a gradient wou
 import warp as wp
 
 from core.kernels.space import Space, from_cells, gradient_in_cells, to_cells
+from core.kernels.touched import is_listed_before
 from core.kernels.types import vec8
 
 wp.set_module_options({"enable_backward": False})
@@ -109,9 +110,8 @@ def adam_texels(
 ):
     """Steps the texels on one part's list, except those that an earlier part lists too."""
     i = touched[part, first + wp.tid()]
-    for p in range(part):
-        if stamp[p, i] == batch:
-            return
+    if is_listed_before(stamp, i, part, batch):
+        return
     updates[i] = wp.min(updates[i] + 1, 10000)
     k = float(updates[i])
     bias = wp.vec2(1.0 - wp.pow(BETA1, k), 1.0 - wp.pow(BETA2, k))

@@ -2,6 +2,7 @@
 
 import warp as wp
 
+from core.kernels.touched import is_listed_before
 from core.kernels.types import vec8
 
 wp.set_module_options({"enable_backward": False})
@@ -56,9 +57,8 @@ def texel_smoothness_gradient(
     Neighbours share a side and a patch, and both are opaque: what is in holes means nothing.
     """
     i = touched[part, first + wp.tid()]
-    for p in range(part):
-        if stamp[p, i] == batch:
-            return
+    if is_listed_before(stamp, i, part, batch):
+        return
     if alpha[i] <= 0.5:
         return
     pull = vec8()

@@ -4,9 +4,11 @@ A patch of K texels a side looks up texel floor(a (K - 1) + 1/2) for a in [0, 1]
 outer ones half of one. A patch of fewer texels holds, for each, the mean over what its interval covers. Fewer texels
 take fewer bits and show another colour: the least of error + slope * bits is chosen for each patch
 (Lagrangian rate-distortion optimisation).
+
+A patch keeps its proportions, or takes one texel along an axis. With every pair of sides to choose from, scene.web.glb
+has 0.3 % (lego_100) to 1.2 % (fox) fewer bytes and the search takes five times as long.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -66,11 +68,11 @@ def size_options(y: np.ndarray, opaque: np.ndarray, most: float, hole_cost: floa
     """
     moments = _moments(y, opaque)
     count, height, width = opaque.shape
+    choices = _pairs(sides(height, most), sides(width, most))
     found = [
-        (size, *_error_and_texels(sums, size, hole_cost))
-        for size, sums in _all_sums(moments, sides(height, most), sides(width, most))
+        (size, *_error_and_texels(_sums(moments, size), size, hole_cost)) for size in choices if size != (height, width)
     ]
-    if (sides(height, most)[-1], sides(width, most)[-1]) == (height, width):  # the patch as it is
+    if choices[-1] == (height, width):  # the patch as it is
         found.append(((height, width), np.zeros(count, np.float32), opaque.sum((1, 2), dtype=np.float32)))
     sizes, errors, texels = zip(*found, strict=True)
     if np.isinf(hole_cost):  # what is lost by the largest size allowed cannot be helped
@@ -99,6 +101,14 @@ def sides(side: int, most: float) -> list[int]:
     largest = side if most >= 1 else min(side, max(2, round(side * most)))
     choices = {1, 2, 3, *(round(largest * share) for share in (0.25, 0.5, 0.75)), largest}
     return sorted(choice for choice in choices if 1 <= choice <= largest)
+
+
+def _pairs(heights: list[int], widths: list[int]) -> list[tuple[int, int]]:
+    """Sizes in proportion, and those of one texel along an axis; the last is the largest."""
+    count, largest = max(len(heights), len(widths)), (heights[-1], widths[-1])
+    steps = [index / max(count - 1, 1) for index in range(count)]
+    even = {(heights[round(step * (len(heights) - 1))], widths[round(step * (len(widths) - 1))]) for step in steps}
+    return [*sorted((even | {(heights[-1], 1), (1, widths[-1])}) - {largest}), largest]
 
 
 @lru_cache(maxsize=256)
@@ -146,19 +156,10 @@ def _error_and_texels(sums: np.ndarray, size: tuple[int, int], hole_cost: float)
     return error.astype(np.float32), solid.sum((0, 1), dtype=np.float32)
 
 
-def _all_sums(
-    values: np.ndarray, heights: list[int], widths: list[int]
-) -> Iterator[tuple[tuple[int, int], np.ndarray]]:
-    """Sums for each pair of sides in turn, but not for the size that the values have."""
-    for height in heights:
-        rows = _along_rows(values, height)
-        for width in widths:
-            if (height, width) != values.shape[:2]:
-                yield (height, width), _along_columns(rows, width)
-
-
 def _sums(values: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """[h', w', c, n] of [h, w, c, n]: integrals over the texels of another size."""
+    if size[0] * values.shape[1] > size[1] * values.shape[0]:  # first the axis that leaves less
+        return _along_rows(_along_columns(values, size[1]), size[0])
     return _along_columns(_along_rows(values, size[0]), size[1])
 
 

@@ -93,3 +93,16 @@ def test_sides_rise_to_the_largest_allowed(side: int, most: float, largest: int)
     choices = sides(side, most)
     assert choices == sorted(set(choices))
     assert choices[-1] == largest
+
+
+@pytest.mark.parametrize("shape", [(7, 7), (17, 5), (4, 9), (3, 1), (1, 1), (2, 7)])
+@pytest.mark.parametrize("most", [1.0, 0.5])
+def test_sizes_rise_in_proportion_to_the_largest(shape: tuple[int, int], most: float) -> None:
+    options = size_options(np.zeros((1, *shape, 8), np.float32), np.ones((1, *shape), bool), most, np.inf)
+    sizes = [tuple(size) for size in options.sizes.tolist()]
+    largest = sides(shape[0], most)[-1], sides(shape[1], most)[-1]
+    assert sizes[-1] == largest and len(set(sizes)) == len(sizes)
+    assert {(1, 1), (largest[0], 1), (1, largest[1])} <= set(sizes)
+    for height, width in sizes:
+        off = abs(height / largest[0] - width / largest[1])
+        assert min(height, width) == 1 or off <= 0.5

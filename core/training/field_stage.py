@@ -6,7 +6,6 @@ network train on both models' errors (eq. 14), the binary one's share growing. I
 
 from typing import Any
 
-import numpy as np
 import torch
 import warp as wp
 from torch import Tensor, nn
@@ -77,7 +76,7 @@ class FieldStage(Stage):
     def after(cls, voxels: VoxelStage, pool: PixelPool) -> "FieldStage":
         """The stage that follows a finished voxel stage."""
         settings, device = voxels.settings, voxels.device
-        mesh = _surveyed_mesh(voxels.field, pool, settings.cells, voxels.seed, device)
+        mesh = _surveyed_mesh(voxels.field, pool, settings.cells, device)
         density = voxels.field.parameters.scalar.clamp_min(0.0)
         # A quad stands for the matter within about a cell of it.
         alpha = 1.0 - torch.exp(-density * (DENSITY_SCALE * mesh.cell_size * mesh.space.inner))
@@ -110,8 +109,8 @@ class FieldStage(Stage):
         stage.restore(state)
         return stage
 
-    def step(self, rng: np.random.Generator) -> float:
-        batch = self._pool.draw(rng, self.settings.field_batch, supersampled=False)
+    def step(self) -> float:
+        batch = self._pool.draw(self.done, self.settings.field_batch, supersampled=False)
         sums = self._tracer.forward(batch, self._volume, binary_only=False)
         (F, A), (F_binary, A_binary) = sums
         for tensor in (F, A, F_binary, A_binary):
@@ -190,14 +189,14 @@ def sampled(volume: Volume, points: Tensor, device: str) -> tuple[Tensor, Tensor
     return alpha, features
 
 
-def _surveyed_mesh(field: VoxelField, pool: PixelPool, cells: int, seed: int, device: str) -> QuadMesh:
-    """The mesh around what random training rays see of the voxel field."""
+def _surveyed_mesh(field: VoxelField, pool: PixelPool, cells: int, device: str) -> QuadMesh:
+    """The mesh around what training rays see of the voxel field."""
     shells = shells_around(field.space, cells)
     survey = Survey.empty(cells, shells if field.space.kind == SHELLS else -1, device)
-    marcher, rng = Marcher(field, device), np.random.default_rng([seed, 2])
+    marcher = Marcher(field, device)
     jitter = torch.full((SURVEY_BATCH,), 0.5, device=device)
-    for _ in range(SURVEY_RAYS // SURVEY_BATCH):
-        batch = pool.draw(rng, SURVEY_BATCH, supersampled=False)
+    for number in range(SURVEY_RAYS // SURVEY_BATCH):
+        batch = pool.draw(number, SURVEY_BATCH, supersampled=False)
         marcher.forward(batch.origins, batch.directions, jitter)
         marcher.survey(batch.origins, batch.directions, survey)
     shape = (cells,) * 3

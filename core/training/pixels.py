@@ -1,5 +1,6 @@
-"""Training pixels: drawn at random, with their rays and their true colours."""
+"""Training pixels, with their rays and their true colours, in an order that spreads evenly."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -23,6 +24,10 @@ BACKGROUND_SHARE = 0.1
 # Pixels within this share of the image's width of the object count as near it.
 NEAR_OBJECT = 0.02
 BLOCK = 2  # pixels per side of what a supersampled batch is drawn in
+# The pool is gone through in steps of about this share of it, its size again and again. Such points lie more evenly
+# than random ones (Weyl's sequence; Knuth, The Art of Computer Programming 3, 6.4, theorem S): every pixel has its turn
+# once in a while, and those of a batch are far from each other. docs/training.md says what that is worth.
+GOLDEN_SHARE = (math.sqrt(5.0) - 1.0) / 2.0
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,9 @@ class PixelPool:
         self._starts = np.concatenate([[0], np.cumsum([camera.size_px[0] * camera.size_px[1] for camera in cameras])])
         self._widths = np.array([camera.size_px[0] for camera in cameras])
         pixels = _side_by_side(views, factor, self._starts)
-        self._pool = _worth_drawing(pixels, views, factor, self._starts, np.random.default_rng([seed, 1]))
+        rng = np.random.default_rng([seed, 1])
+        self._pool = _worth_drawing(pixels, views, factor, self._starts, rng)
+        self._stride, self._phase = _coprime(round(GOLDEN_SHARE * self.size), self.size), int(rng.integers(2**31))
         self._pixels = torch.from_numpy(pixels).to(device)
         self._sub_offsets: Any = wp.array(SUBPIXEL_OFFSETS_PX.astype(np.float32), dtype=wp.vec2, device=device)
         self._no_offset: Any = wp.zeros(1, dtype=wp.vec2, device=device)
@@ -73,14 +80,15 @@ class PixelPool:
         """Number of pixels that may be drawn."""
         return int(self._starts[-1]) if self._pool is None else len(self._pool)
 
-    def draw(self, rng: np.random.Generator, count: int, *, supersampled: bool) -> Batch:
-        """`count` pixels: blocks of 2 x 2 with four sub-rays each, or single ones with one ray through their centre.
+    def draw(self, number: int, count: int, *, supersampled: bool) -> Batch:
+        """Batch `number` of `count` pixels each: in blocks of 2 x 2 with four sub-rays each, or single ones with one
+        ray through their centre.
 
         Rays of a block meet the same cells and texels, which are then in the processor's cache: a step of the texel
         stage takes 30 % less time. (A single ray *somewhere* within its pixel would learn the pixel's mean at every
         place of it, blurred twice: on lego_400 that cost the voxel field 1.25 dB.)
         """
-        image, x, y = self._blocks(rng, count) if supersampled else self._singles(rng, count)
+        image, x, y = self._blocks(number, count) if supersampled else self._singles(number, count)
         index = self._starts[image] + y * self._widths[image] + x
         point = np.stack([x, y], -1) + 0.5
         images: Any = wp.array(image.astype(np.int32), dtype=wp.int32, device=self.device)
@@ -94,19 +102,20 @@ class PixelPool:
         color = values[:, :3] if self.log_gains is None else evened(values[:, :3], self.log_gains[photo])
         return Batch(origins, directions, centres, color * alpha[:, None], alpha, photo)
 
-    def _singles(self, rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _singles(self, number: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(photo, column, row) [count] of pixels of the pool."""
-        index = rng.integers(0, self.size, count)
+        first = (self._phase + number * count * self._stride) % self.size  # whole numbers of any length
+        index = (first + np.arange(count) * self._stride) % self.size
         if self._pool is not None:
             index = self._pool[index].astype(np.int64)
         image = np.searchsorted(self._starts, index, side="right") - 1
         row, column = np.divmod(index - self._starts[image], self._widths[image])
         return image, column, row
 
-    def _blocks(self, rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _blocks(self, number: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """As `_singles`, but in blocks around pixels of the pool. What does not belong to the pool, or lies outside of
         the photo, is drawn as the pixel that the block is around."""
-        image, column, row = (np.repeat(a, BLOCK**2) for a in self._singles(rng, -(-count // BLOCK**2)))
+        image, column, row = (np.repeat(a, BLOCK**2) for a in self._singles(number, -(-count // BLOCK**2)))
         dy, dx = np.divmod(np.arange(len(image)) % BLOCK**2, BLOCK)
         x, y = column + dx - BLOCK // 2, row + dy - BLOCK // 2
         width, first = self._widths[image], self._starts[image]
@@ -158,6 +167,13 @@ def _worth_drawing(
         pool[count : count + len(found)] = found + first
         count += len(found)
     return pool[:count]
+
+
+def _coprime(stride: int, size: int) -> int:
+    """The least number from `stride` on that shares no divisor with `size`: its multiples meet every index."""
+    while math.gcd(stride, size) > 1:
+        stride += 1
+    return stride
 
 
 def _near_object(alpha_u8: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What random training rays saw of the voxel field, per cell of the mesh to be."""
+"""What training rays saw of the voxel field, per cell of the mesh to be."""
 
 from dataclasses import dataclass
 

@@ -106,9 +106,9 @@ class TexelStage(Stage):
         stage.restore(state)
         return stage
 
-    def step(self, rng: np.random.Generator) -> float:
+    def step(self) -> float:
         both, with_alpha = self.fraction < CONTINUOUS_UNTIL, self.fraction < OPACITY_UNTIL
-        batch = self._pool.draw(rng, self.settings.texel_batch, supersampled=True)
+        batch = self._pool.draw(self.done, self.settings.texel_batch, supersampled=True)
         (F, A), (F_binary, A_binary) = self._tracer.forward(batch, self._texels, binary_only=not both)
         for tensor in (F, A, F_binary, A_binary):
             tensor.requires_grad_()

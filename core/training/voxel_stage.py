@@ -104,7 +104,7 @@ class VoxelStage(Stage):
     def _level(self) -> Level:
         return next(level for level in self._levels if self.done < level.end or level is self._levels[-1])
 
-    def step(self, rng: np.random.Generator) -> float:
+    def step(self) -> float:
         level = self._level()
         if level.nodes != self.field.nodes:
             if self._levels.index(level) in EVENED_LEVELS:
@@ -114,7 +114,8 @@ class VoxelStage(Stage):
         elif self._steps_here and self._steps_here % OCCUPANCY_INTERVAL == 0:
             self._update_occupancy(level)
         self._steps_here += 1
-        batch = self._pool.draw(rng, level.batch, supersampled=False)
+        batch = self._pool.draw(self._steps_here, level.batch, supersampled=False)
+        rng = np.random.default_rng([self.seed, 2, self.done])
         jitter = torch.from_numpy(rng.random(level.batch, dtype=np.float32)).to(self.device)
         F, A = self.marcher.forward(batch.origins, batch.directions, jitter)
         F.requires_grad_()
@@ -141,10 +142,10 @@ class VoxelStage(Stage):
     def _even_exposure(self) -> None:
         """Finds how differently the photos are exposed; from now on their colours are freed of it."""
         cameras = [view.camera for view in self.capture.train]
-        survey, rng = BrightnessSurvey(len(cameras), self.device), np.random.default_rng([self.seed, 4])
+        survey = BrightnessSurvey(len(cameras), self.device)
         jitter = torch.full((BRIGHTNESS_BATCH,), 0.5, device=self.device)
-        for _ in range(-(-len(cameras) * BRIGHTNESS_PIXELS // BRIGHTNESS_BATCH)):
-            batch = self._pool.draw(rng, BRIGHTNESS_BATCH, supersampled=False)
+        for number in range(-(-len(cameras) * BRIGHTNESS_PIXELS // BRIGHTNESS_BATCH)):
+            batch = self._pool.draw(number, BRIGHTNESS_BATCH, supersampled=False)
             F, A = self.marcher.forward(batch.origins, batch.directions, jitter)
             with torch.no_grad():
                 color = shade(self.network, F, A, batch.centre_directions)

@@ -101,7 +101,8 @@ def test_sizes_rise_in_proportion_to_the_largest(shape: tuple[int, int], most: f
     options = size_options(np.zeros((1, *shape, 8), np.float32), np.ones((1, *shape), bool), most, np.inf)
     sizes = [tuple(size) for size in options.sizes.tolist()]
     largest = sides(shape[0], most)[-1], sides(shape[1], most)[-1]
-    assert sizes[-1] == largest and len(set(sizes)) == len(sizes)
+    assert sizes[-1] == largest
+    assert len(set(sizes)) == len(sizes)
     assert {(1, 1), (largest[0], 1), (1, largest[1])} <= set(sizes)
     for height, width in sizes:
         off = abs(height / largest[0] - width / largest[1])

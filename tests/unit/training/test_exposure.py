@@ -109,9 +109,9 @@ def test_evened_colours_are_divided_by_the_gain():
 def test_batches_are_freed_of_their_photos_exposure(rng, change):
     views = [change(view) for view in marked_views(rng)]
     pool = PixelPool(views, FRAME, "cpu")
-    plain = pool.draw(np.random.default_rng(1), 200, supersampled=False)
+    plain = pool.draw(1, 200, supersampled=False)
     pool.log_gains = torch.tensor([[0.3, 0.2, 0.1], [-0.3, -0.2, -0.1]])
-    freed = pool.draw(np.random.default_rng(1), 200, supersampled=False)
+    freed = pool.draw(1, 200, supersampled=False)
     torch.testing.assert_close(freed.color, plain.color * torch.exp(-pool.log_gains[plain.image]))
     torch.testing.assert_close(freed.alpha, plain.alpha)
 

@@ -64,7 +64,8 @@ PRESETS: dict[str, Settings] = {
     "balanced": Settings(
         "balanced", cells=96, patch=7, nodes=256, voxel_steps=2600, field_steps=1600, texel_steps=4500
     ),
-    "high": Settings("high", cells=128, patch=9, nodes=256, voxel_steps=8000, field_steps=4000, texel_steps=12000),
+    # Most steps go where cells are fine: into the field stage (docs/training.md).
+    "high": Settings("high", cells=128, patch=7, nodes=256, voxel_steps=4000, field_steps=5000, texel_steps=1800),
 }
 
 

@@ -15,7 +15,7 @@ from exporters.gltf.quantization import steps_of
 from exporters.gltf.storage import IMAGES_PER_PAGE, NamedImage, accessor, corners, index_types, primitive
 from exporters.png import encode_png, middle_band
 from exporters.threads import mapped
-from exporters.webp import Effort, effort_for, encode_webp
+from exporters.webp import QUICK_FROM_TEXELS, encode_webp
 
 QUANTIZATION = "KHR_mesh_quantization"
 # A texture coordinate is (x + 1/2) / 4096 or a coarser one: 13 bits and a sign, exactly.
@@ -37,7 +37,7 @@ class CompressedStorage:
 
     def add_textures(self, document: gltf.GLTF2, images: Sequence[NamedImage]) -> None:
         texels = sum(image.pixels.shape[0] * image.pixels.shape[1] for image in images) // IMAGES_PER_PAGE
-        files = mapped(_coding(effort_for(texels)), images)
+        files = mapped(_coding(quick=texels > QUICK_FROM_TEXELS), images)
         for image, (kind, data) in zip(images, files, strict=True):
             view = self.blob.append(data)
             document.images.append(gltf.Image(name=image.name, mimeType=f"image/{kind}", bufferView=view))
@@ -134,11 +134,11 @@ def decoded_exponential(rows: np.ndarray) -> np.ndarray:
     return np.ldexp(mantissa.astype(np.float32), exponent)
 
 
-def _coding(effort: Effort) -> Callable[[NamedImage], tuple[str, bytes]]:
+def _coding(*, quick: bool) -> Callable[[NamedImage], tuple[str, bytes]]:
     """Makes of an image ("webp" or "png", the file): what is smaller on its middle rows."""
 
     def webp(image: NamedImage, pixels: np.ndarray) -> tuple[str, bytes]:
-        return "webp", encode_webp(pixels, exact=image.exact, effort=effort)
+        return "webp", encode_webp(pixels, exact=image.exact, quick=quick)
 
     def smallest(image: NamedImage) -> tuple[str, bytes]:
         band = middle_band(image.pixels)

@@ -266,14 +266,14 @@ def scaled_camera(camera: Camera, scale: float) -> Camera:
 
 
 def test_a_loss_that_is_no_number_ends_training(capture, monkeypatch):
-    monkeypatch.setattr(VoxelStage, "step", lambda self, rng: float("nan"))
+    monkeypatch.setattr(VoxelStage, "step", lambda self: float("nan"))
     with pytest.raises(TrainingFailed, match="step 0"):
         reconstruct(capture, HASTY, device="cpu")
 
 
 def test_the_callers_torch_threads_are_as_before_even_after_an_error(capture, monkeypatch):
     torch.set_num_threads(2)
-    monkeypatch.setattr(VoxelStage, "step", lambda self, rng: float("nan"))
+    monkeypatch.setattr(VoxelStage, "step", lambda self: float("nan"))
     with pytest.raises(TrainingFailed):
         reconstruct(capture, HASTY, device="cpu")
     assert torch.get_num_threads() == 2

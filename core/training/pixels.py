@@ -24,9 +24,9 @@ BACKGROUND_SHARE = 0.1
 # Pixels within this share of the image's width of the object count as near it.
 NEAR_OBJECT = 0.02
 BLOCK = 2  # pixels per side of what a supersampled batch is drawn in
-# The pool is gone through in steps of about this share of it, its size again and again. Such points lie more evenly
-# than random ones (Weyl's sequence; Knuth, The Art of Computer Programming 3, 6.4, theorem S): every pixel has its turn
-# once in a while, and those of a batch are far from each other. docs/training.md says what that is worth.
+# The pool is gone through in steps of about this share of its size, round and round. Such points lie more evenly than
+# random ones (Weyl's sequence; Knuth, The Art of Computer Programming 3, 6.4, theorem S): every pixel has its turn once
+# a round, and those of a batch are far from each other. docs/training.md says what that is worth.
 GOLDEN_SHARE = (math.sqrt(5.0) - 1.0) / 2.0
 
 

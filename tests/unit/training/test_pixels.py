@@ -179,7 +179,7 @@ def test_a_batch_is_spread_over_the_photos_more_evenly_than_chance(rng):
         assert np.abs(counts - 100).max() <= 4
 
 
-def test_late_batches_of_the_largest_pools_are_drawn_exactly(rng):
+def test_late_batches_are_drawn_exactly(rng):
     pool = PixelPool(marked_views(rng), FRAME, "cpu")
     number, count = 10**12 + 7, 64
     index = [(pool._phase + (number * count + k) * pool._stride) % pool.size for k in range(count)]

@@ -10,6 +10,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from core.conventions import FEATURE_CHANNELS
+from core.field.bricks import in_brick_order
 from core.field.parameters import Parameters
 from core.field.space import CUBE, Space
 from core.kernels.march import VoxelGrid
@@ -101,11 +102,11 @@ class VoxelField:
 
 
 def _active_nodes(occupied: Tensor, nodes: int) -> Tensor:
-    """Indices of exactly the nodes that samples in occupied cells may read: those that train."""
+    """Exactly the nodes that samples in occupied cells may read: those that train."""
     cells, i = occupied.shape[0], torch.arange(nodes, device=occupied.device)
     # Node i is read between nodes i - 1 and i + 1. Cells and nodes share no grid: there may be more of either.
     first, last = (i - 1) * cells // (nodes - 1), -(-(i + 1) * cells // (nodes - 1)) - 1
-    return _any_in(occupied, first.clamp_min(0), last.clamp_max(cells - 1)).reshape(-1).nonzero()[:, 0].to(torch.int32)
+    return in_brick_order(_any_in(occupied, first.clamp_min(0), last.clamp_max(cells - 1)))
 
 
 def _on_grid(hull: Tensor, cells: int) -> Tensor:

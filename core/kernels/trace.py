@@ -18,7 +18,7 @@ from typing import Any
 import warp as wp
 
 from core.kernels.space import TAPER, Space, cells_span, heading, shell_cell, to_cells
-from core.kernels.types import FAR, NEAR, PARALLEL, vec8
+from core.kernels.types import FAR, NEAR, PARALLEL, brick_place, vec8
 
 OPTIONS = {"enable_backward": False, "fast_math": True}
 wp.set_module_options(OPTIONS)
@@ -33,7 +33,9 @@ class QuadMesh:
 
     space: Space
     cells: int  # P, per axis
-    cell_slot: wp.array(dtype=wp.int32)  # [P^3] -> slot, or -(cells to the nearest cell that has one)
+    bricks: int  # per axis, of the cells (core/field/bricks.py)
+    cell_distance: wp.array(dtype=wp.uint8)  # [places], cells to the nearest kept cell, 0 in one
+    cell_slot: wp.array(dtype=wp.int32)  # [places] -> slot of a kept cell
     slot_start: wp.array(dtype=wp.int32)  # [slots + 1] into slot_quads
     slot_quads: wp.array(dtype=wp.int32)
     quads: wp.array(dtype=wp.vec4i)  # [Q] -> vertices
@@ -265,22 +267,37 @@ def trace_kernel(alpha_of: Callable[..., float], surface_type: Any) -> wp.Kernel
         size = 2.0 / float(P)
         half_cells = 0.5 * float(P)
         cell = cell_at(to_cells(mesh.space, o + t * d), P)
+        place = brick_place(cell, mesh.bricks)
+        distance = int(mesh.cell_distance[place])
         T = float(1.0)
         opaque = int(0)
         n = int(0)
         lit = bool(True)
         alive = t < stop
         while alive:
-            slot = mesh.cell_slot[(cell[0] * P + cell[1]) * P + cell[2]]
             # An empty cell tells how far around it all others are empty too: leave that block in one go.
-            reach = wp.max(-slot, 1)
+            reach = wp.max(distance, 1)
             leave = block_exit(mesh.space, o, d, way, cell, reach, size)
             t_leave = wp.min(leave)
-            if slot >= 0:
+            here = place
+            is_kept = distance == 0
+            cell = next_cell(to_cells(mesh.space, o + t_leave * d), way, cell, reach, leave, half_cells)
+            outside = wp.min(cell) < 0 or wp.max(cell) >= P
+            # Asked for already now: memory answers while this cell's quads are looked at.
+            if not outside:
+                place = brick_place(cell, mesh.bricks)
+                distance = int(mesh.cell_distance[place])
+            if is_kept:
                 lowest = n
-                for k in range(mesh.slot_start[slot], mesh.slot_start[slot + 1]):
-                    quad = mesh.slot_quads[k]
-                    if meets_ball(mesh.balls[quad], o, d):
+                slot = mesh.cell_slot[here]
+                start = mesh.slot_start[slot]
+                stop_at = mesh.slot_start[slot + 1]
+                candidates = int(0)  # without a branch, so that memory fetches all balls at once
+                for k in range(start, stop_at):
+                    candidates |= wp.where(meets_ball(mesh.balls[mesh.slot_quads[k]], o, d), 1, 0) << (k - start)
+                for k in range(start, stop_at):
+                    if (candidates >> (k - start)) & 1 == 1:
+                        quad = mesh.slot_quads[k]
                         first_hit, second_hit = hit_quad(mesh, quad, o, e1, e2, d)
                         n = insert_hit(hits, r, lowest, n, quad, first_hit, t, t_leave)
                         n = insert_hit(hits, r, lowest, n, quad, second_hit, t, t_leave)
@@ -297,8 +314,6 @@ def trace_kernel(alpha_of: Callable[..., float], surface_type: Any) -> wp.Kernel
                         n = m
                         lit = False
             t = t_leave
-            cell = next_cell(to_cells(mesh.space, o + t * d), way, cell, reach, leave, half_cells)
-            outside = wp.min(cell) < 0 or wp.max(cell) >= P
             alive = lit and t < stop and n < capacity and not outside
         shell = int(0)
         while lit and n < capacity and shell < mesh.shell_halves.shape[0]:

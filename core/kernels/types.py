@@ -53,6 +53,13 @@ def corner_offset(corner: int, nodes: int):
 
 
 @wp.func
+def brick_place(cell: wp.vec3i, bricks: int):
+    """The place of a cell in brick order (core/field/bricks.py), in a grid of so many bricks per axis."""
+    brick = ((cell[0] >> 2) * bricks + (cell[1] >> 2)) * bricks + (cell[2] >> 2)
+    return (brick << 6) | ((cell[0] & 3) << 4) | ((cell[1] & 3) << 2) | (cell[2] & 3)
+
+
+@wp.func
 def node_of(p: wp.vec3, nodes: int):
     """(flat index of the lowest corner, fraction) of a point of the cube in a grid of nodes^3, clamped to the grid."""
     s = float(nodes - 1) * 0.5

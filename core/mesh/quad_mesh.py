@@ -13,6 +13,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from core.errors import TrainingFailed
+from core.field.bricks import BRICK, brick_places, bricks_along
 from core.field.space import SHELLS, Space
 from core.kernels.launch import launch
 from core.kernels.trace import QuadMesh as KernelMesh
@@ -71,16 +72,20 @@ class QuadMesh:
         corner = self.quads.reshape(-1)
         order = np.argsort(corner, kind="stable")
         start = np.searchsorted(corner[order], np.arange(len(self.kept) + 1))
-        slots = -_distance_to(self.kept, self.cells)
-        slots[self.kept] = np.arange(len(self.kept))
         mesh = KernelMesh()
         mesh.cells, mesh.space, mesh.movable = self.cells, self.space.kernel_space(), len(self.kept)
+        mesh.bricks = bricks_along(self.cells)
+        distances, slots = self._cells_in_bricks()
+        mesh.cell_distance = wp.array(distances, dtype=wp.uint8, device=device)
         mesh.cell_slot = wp.array(slots, dtype=wp.int32, device=device)
         mesh.slot_start = wp.array(start.astype(np.int32), dtype=wp.int32, device=device)
         mesh.slot_quads = wp.array((order // CORNERS).astype(np.int32), dtype=wp.int32, device=device)
-        mesh.quads = wp.array(self.quads, dtype=wp.vec4i, device=device)
+        # A quad's corners and its ball lie in one cache line: tracing reads the one after the other.
+        records = torch.zeros(len(self.quads), 2, CORNERS, device=device)
+        corners = records[:, 1].view(torch.int32)
+        corners.copy_(torch.from_numpy(self.quads))
+        mesh.balls, mesh.quads = wp.from_torch(records[:, 0], dtype=wp.vec4), wp.from_torch(corners, dtype=wp.vec4i)
         mesh.vertices = wp.from_torch(self.vertices, dtype=wp.vec3)
-        mesh.balls = wp.zeros(len(self.quads), dtype=wp.vec4, device=device)
         halves = self.space.shell_halves(self.shells).astype(np.float32)
         shell_quads = np.full(len(halves) * FACES * self.cells**2, -1, np.int32)
         if len(self.shell_cells):
@@ -90,6 +95,16 @@ class QuadMesh:
         mesh.shell_quads = wp.array(shell_quads, dtype=wp.int32, device=device)
         launch(bound_quads, len(self.quads), [mesh], device)
         return mesh
+
+    def _cells_in_bricks(self) -> tuple[np.ndarray, np.ndarray]:
+        """(cells to the nearest kept cell [places] uint8, slots of kept cells [places] int32), in brick order."""
+        shape = (self.cells,) * 3
+        place = brick_places(np.stack(np.indices(shape), -1).reshape(-1, 3), self.cells)
+        distances = np.full(bricks_along(self.cells) ** 3 * BRICK**3, FARTHEST, np.uint8)
+        distances[place] = _distance_to(self.kept, self.cells)
+        slots = np.zeros(len(distances), np.int32)
+        slots[place[self.kept]] = np.arange(len(self.kept))
+        return distances, slots
 
 
 def shells_around(space: Space, cells: int) -> int:
@@ -124,8 +139,8 @@ def build_mesh(
             "an empty scene",
             "Check the poses and the background; a capture needs photos that overlap.",
         )
-    kept, quads = np.unique(corners, return_inverse=True)
-    quads = np.concatenate([quads.reshape(-1, CORNERS), shell_quads + len(kept)]).astype(np.int32)
+    kept, quads = _in_brick_order(corners, cells)
+    quads = np.concatenate([quads, shell_quads + len(kept)]).astype(np.int32)
     of_shells = np.concatenate([np.full(len(corners), -1), shell_cells]) if len(shell_cells) else np.zeros(0, np.int64)
     mesh = QuadMesh(cells, kept, torch.empty(0), quads, space, of_shells)
     centres = mesh.centres()
@@ -165,6 +180,17 @@ def _distance_to(kept: np.ndarray, cells: int) -> np.ndarray:
         distance[(near.view(-1) > 0) & (distance == FARTHEST)] = steps
         near = functional.max_pool3d(near, 3, 1, 1)
     return distance.numpy()
+
+
+def _in_brick_order(corners: np.ndarray, cells: int) -> tuple[np.ndarray, np.ndarray]:
+    """(kept cells [V], quads [n, 4] of places among them) of quads between cells [n, 4], both in brick order."""
+    kept, quads = np.unique(corners, return_inverse=True)
+    place = brick_places(np.stack(np.unravel_index(kept, (cells,) * 3), -1), cells)
+    order = np.argsort(place)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    quads = rank[quads.reshape(-1, CORNERS)]
+    return kept[order], quads[np.argsort(quads[:, 0], kind="stable")]
 
 
 def _quads_across(solid: np.ndarray, index: np.ndarray, axis: int) -> np.ndarray:

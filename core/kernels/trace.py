@@ -24,7 +24,7 @@ OPTIONS = {"enable_backward": False, "fast_math": True}
 wp.set_module_options(OPTIONS)
 
 # Light that is left when the continuous model stops.
-OPAQUE = wp.constant(1.0e-3)
+OPAQUE = wp.constant(1.0e-2)
 
 
 @wp.struct

@@ -1,6 +1,8 @@
 """Which device the work runs on."""
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from core.errors import OptionInvalid
 
@@ -32,6 +34,19 @@ def resolve_device(name: str = AUTO) -> str:
             "Use --device cpu, or install the CUDA build.",
         )
     return f"cuda:{index}"
+
+
+@contextmanager
+def torch_threads(count: int) -> Iterator[None]:
+    """Within, PyTorch uses so many threads on the CPU; afterwards as many as before."""
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def usable_gpus() -> int:

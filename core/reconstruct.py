@@ -3,12 +3,11 @@
 import hashlib
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import torch
 from torch import nn
 
 from core.baked import BakedScene
@@ -16,7 +15,7 @@ from core.baking.bake import bake, quick_bake
 from core.baking.preview import preview_of_field, preview_of_scene
 from core.capture import Capture
 from core.checkpoint import CheckpointFile
-from core.device import resolve_device
+from core.device import CPU, resolve_device, torch_threads
 from core.errors import OptionInvalid
 from core.field.network import new_network
 from core.field.region import Region, find_region
@@ -32,7 +31,7 @@ from core.training.voxel_stage import VoxelStage
 STAGE_SHARES = {"voxels": 0.20, "field": 0.22, "texels": 0.52, "bake": 0.06}
 REPORT_INTERVAL_S = 0.5
 # To be raised when a stage keeps other things: checkpoints of another format are ignored, not misread.
-CHECKPOINT_FORMAT = 4
+CHECKPOINT_FORMAT = 5
 PREVIEW_INTERVAL_S = 20.0
 MAX_SEED = 2**31 - 1
 
@@ -70,20 +69,9 @@ def reconstruct(
     if not 0 <= seed <= MAX_SEED:
         raise OptionInvalid("seed", f"must be between 0 and {MAX_SEED}", str(seed))
     resolved = resolve_device(device)
-    with _one_torch_thread(resolved):
+    # Beside the kernels' threads, a pool of torch's would spin: a 3 ms network then takes up to 300 ms.
+    with torch_threads(1) if resolved == CPU else nullcontext():
         return _Run(capture, settings, resolved, seed, checkpoint_dir, progress).reconstruction()
-
-
-@contextmanager
-def _one_torch_thread(device: str) -> Iterator[None]:
-    """On the CPU, torch's thread pool spins against the kernels' threads: a 3 ms network then takes up to 300 ms."""
-    threads = torch.get_num_threads()
-    if device == "cpu":
-        torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
 
 
 class _Run:

@@ -10,7 +10,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from core.conventions import FEATURE_CHANNELS
-from core.field.bricks import in_brick_order
+from core.field.bricks import from_bricks, places_in, to_bricks
 from core.field.parameters import Parameters
 from core.field.space import CUBE, Space
 from core.kernels.march import VoxelGrid
@@ -34,7 +34,8 @@ class VoxelField:
     """Attributes:
     space: where the grid lies.
     nodes: per axis.
-    parameters: of nodes^3 entries, scalar = raw density. Only nodes that samples in occupied cells may read train.
+    parameters: of the nodes in brick order, scalar = raw density. Only nodes that samples in occupied cells may read
+        train.
     occupied: [cells, cells, cells] bool.
     """
 
@@ -46,10 +47,9 @@ class VoxelField:
     @classmethod
     def new(cls, space: Space, nodes: int, hull: np.ndarray, seed: int, device: str) -> "VoxelField":
         generator = torch.Generator().manual_seed(seed)
-        n = nodes**3
-        noise = torch.randn(n, FEATURE_CHANNELS, generator=generator)
-        density = torch.full((n,), INITIAL_DENSITY)
-        density[torch.from_numpy(space.backdrop(nodes)).reshape(-1)] = BACKDROP_DENSITY
+        noise = torch.randn(places_in(nodes), FEATURE_CHANNELS, generator=generator)
+        density = torch.full((places_in(nodes),), INITIAL_DENSITY)
+        density[to_bricks(torch.from_numpy(space.backdrop(nodes)))] = BACKDROP_DENSITY
         occupied = torch.from_numpy(hull.copy()).to(device)
         features = (0.5 + 0.02 * noise).to(device)
         parameters = Parameters.starting_from(density.to(device), features, _active_nodes(occupied, nodes))
@@ -67,21 +67,21 @@ class VoxelField:
 
     def upsampled(self, nodes: int) -> "VoxelField":
         """The same field on a finer grid, with fresh moments."""
-        old = torch.cat([self.parameters.scalar[:, None], self.parameters.features], 1)
-        grid = old.T.reshape(1, -1, self.nodes, self.nodes, self.nodes)
-        fine = functional.interpolate(grid, size=(nodes,) * 3, mode="trilinear", align_corners=True)
-        fine = fine[0].reshape(1 + FEATURE_CHANNELS, -1)
-        active = _active_nodes(self.occupied, nodes)
-        parameters = Parameters.starting_from(fine[0].contiguous(), fine[1:].T.contiguous(), active)
+        old = self.parameters
+        features = torch.empty(places_in(nodes), FEATURE_CHANNELS, device=old.features.device)
+        for channel in range(FEATURE_CHANNELS):  # one by one: a grid takes 64 MB at 256 nodes
+            features[:, channel] = _refined(old.features[:, channel], self.nodes, nodes)
+        density = _refined(old.scalar, self.nodes, nodes)
+        parameters = Parameters.starting_from(density, features, _active_nodes(self.occupied, nodes))
         return VoxelField(self.space, nodes, parameters, self.occupied)
 
     def update_occupancy(self, cells: int, hull: np.ndarray) -> None:
         """Drops what is empty: cells whose averaged density is low, and cells outside of the hull."""
         n = self.nodes
-        density = self.parameters.scalar.reshape(n, n, n)
+        density = from_bricks(self.parameters.scalar, n)
         kept = _over_neighbours(density.clamp(max=1.0), torch.add, EMPTY_DENSITY) > KEPT_DENSITY * 27
         near = _over_neighbours(kept, torch.logical_or, False)
-        self.parameters.scalar[~near.reshape(-1)] = EMPTY_DENSITY
+        self.parameters.scalar[~to_bricks(near)] = EMPTY_DENSITY
         found = functional.adaptive_max_pool3d(kept.float()[None, None], cells)[0, 0] > 0
         occupied = _over_neighbours(found, torch.logical_or, False)
         occupied |= torch.from_numpy(self.space.backdrop(cells)).to(occupied.device)
@@ -101,12 +101,19 @@ class VoxelField:
         return grid
 
 
+def _refined(values: Tensor, nodes: int, finer: int) -> Tensor:
+    """[places]: values [places] at nodes, on a finer grid, trilinear in between."""
+    grid = from_bricks(values, nodes)[None, None]
+    return to_bricks(functional.interpolate(grid, size=(finer,) * 3, mode="trilinear", align_corners=True)[0, 0])
+
+
 def _active_nodes(occupied: Tensor, nodes: int) -> Tensor:
-    """Exactly the nodes that samples in occupied cells may read: those that train."""
+    """[m] int32: places of exactly the nodes that samples in occupied cells may read, those that train; rising."""
     cells, i = occupied.shape[0], torch.arange(nodes, device=occupied.device)
     # Node i is read between nodes i - 1 and i + 1. Cells and nodes share no grid: there may be more of either.
     first, last = (i - 1) * cells // (nodes - 1), -(-(i + 1) * cells // (nodes - 1)) - 1
-    return in_brick_order(_any_in(occupied, first.clamp_min(0), last.clamp_max(cells - 1)))
+    read = _any_in(occupied, first.clamp_min(0), last.clamp_max(cells - 1))
+    return to_bricks(read).nonzero()[:, 0].to(torch.int32)
 
 
 def _on_grid(hull: Tensor, cells: int) -> Tensor:

@@ -21,8 +21,8 @@ MAX_THREADS = 8
 RANGES_PER_THREAD = 4  # rays differ in cost: smaller ranges even the threads out
 CPU_ACCUMULATORS = 2
 
-_THREADS = min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, MAX_THREADS)
-_POOL = ThreadPoolExecutor(_THREADS, thread_name_prefix="kernel")
+THREADS = min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, MAX_THREADS)
+_POOL = ThreadPoolExecutor(THREADS, thread_name_prefix="kernel")
 
 Inputs = Sequence[Any] | Callable[[int], Sequence[Any]]
 
@@ -42,7 +42,7 @@ def launch(kernel: wp.Kernel, count: int, inputs: Inputs, device: str, parts: in
     """
     if count <= 0:
         return
-    ranges = _ranges(count, parts or (1 if device != "cpu" else _THREADS * RANGES_PER_THREAD))
+    ranges = _ranges(count, parts or (1 if device != "cpu" else THREADS * RANGES_PER_THREAD))
 
     def run(part: int) -> None:
         first, stop = ranges[part]

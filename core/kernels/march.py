@@ -24,7 +24,7 @@ from core.kernels.space import (
     to_cells,
     to_grid,
 )
-from core.kernels.types import FAR, cell_of, corner_offset, corner_weight, node_of, safe_inverse, vec8
+from core.kernels.types import FAR, cell_of, corner_place, corner_weight, nodes_around, safe_inverse, vec8
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -40,9 +40,9 @@ MIN_FEATURE_WEIGHT = wp.constant(1.0e-4)
 class VoxelGrid:
     space: Space
     nodes: int  # per axis
-    density: wp.array(dtype=float)  # raw, [nodes^3]
-    features: wp.array(dtype=vec8)  # [nodes^3]
-    row_of: wp.array(dtype=wp.int32)  # [nodes^3], where a node's gradient goes, or -1
+    density: wp.array(dtype=float)  # raw, [places] (core/field/bricks.py)
+    features: wp.array(dtype=vec8)  # [places]
+    row_of: wp.array(dtype=wp.int32)  # [places], where a node's gradient goes, or -1
     cells: int  # of the occupancy grid, per axis
     occupied: wp.array(dtype=wp.uint8)  # [cells^3]
     step: float
@@ -115,17 +115,17 @@ def march_forward(
             t += steps * advance
             s += steps * grid.step
         else:
-            base, f = node_of(g, grid.nodes)
+            low, high, f = nodes_around(g, grid.nodes)
             raw = float(0.0)
             for c in range(8):
-                raw += corner_weight(c, f) * grid.density[base + corner_offset(c, grid.nodes)]
+                raw += corner_weight(c, f) * grid.density[corner_place(c, low, high)]
             if raw > LEAK:
                 if n == capacity:
                     n = capacity + 1
                     break
                 feature = vec8()
                 for c in range(8):
-                    feature += corner_weight(c, f) * grid.features[base + corner_offset(c, grid.nodes)]
+                    feature += corner_weight(c, f) * grid.features[corner_place(c, low, high)]
                 a = float(0.0)
                 if raw > 0.0:
                     a = 1.0 - wp.exp(-raw * grid.density_scale * grid.step)
@@ -193,9 +193,9 @@ def march_backward(
         grad_alpha = T * (grad_w - behind)
         behind = a * grad_w + (1.0 - a) * behind
         grad_raw = grad_alpha * (1.0 - a) * grid.step * grid.density_scale
-        base, f = node_of(to_grid(grid.space, o + samples.t[r, n] * d), grid.nodes)
+        low, high, f = nodes_around(to_grid(grid.space, o + samples.t[r, n] * d), grid.nodes)
         for c in range(8):
-            row = grid.row_of[base + corner_offset(c, grid.nodes)]
+            row = grid.row_of[corner_place(c, low, high)]
             if row >= 0:
                 weight = corner_weight(c, f)
                 wp.atomic_add(grad_density, part, row, weight * grad_raw)

@@ -5,7 +5,7 @@ import warp as wp
 from core.kernels.composite import backward_kernel, composite_kernel
 from core.kernels.space import Space, grid_velocity, to_grid
 from core.kernels.trace import QuadMesh, corner_weights, trace_kernel
-from core.kernels.types import corner_offset, corner_weight, node_of, vec8
+from core.kernels.types import corner_place, corner_weight, nodes_around, vec8
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -15,7 +15,7 @@ GRAZING = wp.constant(0.1)
 
 @wp.struct
 class Volume:
-    """Opacity and features on a grid of nodes, trilinear in between."""
+    """Opacity and features [places] on a grid of nodes in brick order (core/field/bricks.py), trilinear in between."""
 
     space: Space
     nodes: int
@@ -25,7 +25,7 @@ class Volume:
 
 @wp.struct
 class VolumeGradients:
-    row_of: wp.array(dtype=wp.int32)  # [nodes^3], where a node's gradient goes, or -1
+    row_of: wp.array(dtype=wp.int32)  # [places], where a node's gradient goes, or -1
     alpha: wp.array2d(dtype=float)  # [parts, rows]
     features: wp.array2d(dtype=vec8)
     touched: wp.array(dtype=wp.uint8)
@@ -54,19 +54,19 @@ class TexelGradients:
 
 @wp.func
 def volume_alpha(volume: Volume, quad: int, ab: wp.vec2, p: wp.vec3):
-    base, f = node_of(to_grid(volume.space, p), volume.nodes)
+    low, high, f = nodes_around(to_grid(volume.space, p), volume.nodes)
     alpha = float(0.0)
     for c in range(8):
-        alpha += corner_weight(c, f) * volume.alpha[base + corner_offset(c, volume.nodes)]
+        alpha += corner_weight(c, f) * volume.alpha[corner_place(c, low, high)]
     return alpha
 
 
 @wp.func
 def volume_features(volume: Volume, quad: int, ab: wp.vec2, p: wp.vec3):
-    base, f = node_of(to_grid(volume.space, p), volume.nodes)
+    low, high, f = nodes_around(to_grid(volume.space, p), volume.nodes)
     features = vec8()
     for c in range(8):
-        features += corner_weight(c, f) * volume.features[base + corner_offset(c, volume.nodes)]
+        features += corner_weight(c, f) * volume.features[corner_place(c, low, high)]
     return features
 
 
@@ -85,10 +85,10 @@ def volume_scatter(
     grad_features: vec8,
 ):
     p = o + t * d
-    base, f = node_of(to_grid(volume.space, p), volume.nodes)
+    low, high, f = nodes_around(to_grid(volume.space, p), volume.nodes)
     slope = wp.vec3()  # dL/d(grid point), in node spacings
     for c in range(8):
-        node = base + corner_offset(c, volume.nodes)
+        node = corner_place(c, low, high)
         weight = corner_weight(c, f)
         row = gradients.row_of[node]
         if row >= 0:

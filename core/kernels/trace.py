@@ -267,7 +267,7 @@ def trace_kernel(alpha_of: Callable[..., float], surface_type: Any) -> wp.Kernel
         size = 2.0 / float(P)
         half_cells = 0.5 * float(P)
         cell = cell_at(to_cells(mesh.space, o + t * d), P)
-        place = brick_place(cell, mesh.bricks)
+        place = brick_place(cell[0], cell[1], cell[2], mesh.bricks)
         distance = int(mesh.cell_distance[place])
         T = float(1.0)
         opaque = int(0)
@@ -285,7 +285,7 @@ def trace_kernel(alpha_of: Callable[..., float], surface_type: Any) -> wp.Kernel
             outside = wp.min(cell) < 0 or wp.max(cell) >= P
             # Asked for already now: memory answers while this cell's quads are looked at.
             if not outside:
-                place = brick_place(cell, mesh.bricks)
+                place = brick_place(cell[0], cell[1], cell[2], mesh.bricks)
                 distance = int(mesh.cell_distance[place])
             if is_kept:
                 lowest = n

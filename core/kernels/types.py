@@ -47,21 +47,24 @@ def corner_weight(corner: int, f: wp.vec3):
 
 
 @wp.func
-def corner_offset(corner: int, nodes: int):
-    """Offset of corner 0..7 in a flat [nodes, nodes, nodes] grid."""
-    return (((corner >> 2) & 1) * nodes + ((corner >> 1) & 1)) * nodes + (corner & 1)
+def brick_place(i: int, j: int, k: int, bricks: int):
+    """The place of an entry in brick order (core/field/bricks.py), in a grid of so many bricks per axis."""
+    brick = ((i >> 2) * bricks + (j >> 2)) * bricks + (k >> 2)
+    return (brick << 6) | ((i & 3) << 4) | ((j & 3) << 2) | (k & 3)
 
 
 @wp.func
-def brick_place(cell: wp.vec3i, bricks: int):
-    """The place of a cell in brick order (core/field/bricks.py), in a grid of so many bricks per axis."""
-    brick = ((cell[0] >> 2) * bricks + (cell[1] >> 2)) * bricks + (cell[2] >> 2)
-    return (brick << 6) | ((cell[0] & 3) << 4) | ((cell[1] & 3) << 2) | (cell[2] & 3)
+def corner_place(corner: int, low: wp.vec3i, high: wp.vec3i):
+    """The place of corner 0..7 (bits: x, y, z) from what each axis adds to it at the lowest and the highest corner."""
+    x = wp.where((corner & 4) != 0, high[0], low[0])
+    y = wp.where((corner & 2) != 0, high[1], low[1])
+    z = wp.where((corner & 1) != 0, high[2], low[2])
+    return x + y + z
 
 
 @wp.func
-def node_of(p: wp.vec3, nodes: int):
-    """(flat index of the lowest corner, fraction) of a point of the cube in a grid of nodes^3, clamped to the grid."""
+def nodes_around(p: wp.vec3, nodes: int):
+    """(low, high, fraction) of a point of the cube in a grid of nodes^3, clamped to the grid; see `corner_place`."""
     s = float(nodes - 1) * 0.5
     top = float(nodes - 1) - 1.0e-3
     x = wp.clamp((p[0] + 1.0) * s, 0.0, top)
@@ -70,7 +73,10 @@ def node_of(p: wp.vec3, nodes: int):
     i = int(x)
     j = int(y)
     k = int(z)
-    return (i * nodes + j) * nodes + k, wp.vec3(x - float(i), y - float(j), z - float(k))
+    b = (nodes + 3) >> 2
+    low = wp.vec3i(brick_place(i, 0, 0, b), brick_place(0, j, 0, b), brick_place(0, 0, k, b))
+    high = wp.vec3i(brick_place(i + 1, 0, 0, b), brick_place(0, j + 1, 0, b), brick_place(0, 0, k + 1, b))
+    return low, high, wp.vec3(x - float(i), y - float(j), z - float(k))
 
 
 @wp.func

@@ -99,7 +99,7 @@ class QuadMesh:
     def _cells_in_bricks(self) -> tuple[np.ndarray, np.ndarray]:
         """(cells to the nearest kept cell [places] uint8, slots of kept cells [places] int32), in brick order."""
         shape = (self.cells,) * 3
-        place = brick_places(np.stack(np.indices(shape), -1).reshape(-1, 3), self.cells)
+        place = brick_places(np.moveaxis(np.indices(shape), 0, -1).reshape(-1, 3), self.cells)
         distances = np.full(bricks_along(self.cells) ** 3 * BRICK**3, FARTHEST, np.uint8)
         distances[place] = _distance_to(self.kept, self.cells)
         slots = np.zeros(len(distances), np.int32)

@@ -10,6 +10,7 @@ import torch
 import warp as wp
 from torch import Tensor, nn
 
+from core.field.bricks import places_in, to_bricks
 from core.field.frame import as_vec3, empty
 from core.field.network import shade
 from core.field.parameters import Parameters
@@ -21,6 +22,7 @@ from core.kernels.surfaces import VOLUME_KERNELS, Volume, VolumeGradients, sampl
 from core.kernels.types import vec8
 from core.mesh.quad_mesh import FACES, VERTEX_REACH, QuadMesh, build_mesh, shells_around
 from core.presets import Settings
+from core.training.drawing import BatchSequence
 from core.training.loss import color_error, pixel_loss
 from core.training.marcher import Marcher, step_grid
 from core.training.pixels import PixelPool
@@ -61,7 +63,7 @@ class FieldStage(Stage):
         super().__init__(network, settings, settings.field_steps, seed, device)
         self.mesh, self.nodes, self.parameters = mesh, nodes, parameters
         self.seen = torch.zeros(len(mesh.quads), dtype=torch.bool, device=device)
-        self._pool = pool
+        self._batches = BatchSequence(pool, settings.field_batch, supersampled=False)
         self._tracer = Tracer(mesh, VOLUME_KERNELS, settings.field_batch, 1, HIT_CAPACITY)
         self._volume = volume_of(mesh.space, nodes, parameters)
         self._touched = torch.zeros(len(parameters.trained), dtype=torch.uint8, device=device)
@@ -80,7 +82,7 @@ class FieldStage(Stage):
         density = voxels.field.parameters.scalar.clamp_min(0.0)
         # A quad stands for the matter within about a cell of it.
         alpha = 1.0 - torch.exp(-density * (DENSITY_SCALE * mesh.cell_size * mesh.space.inner))
-        backdrop = torch.from_numpy(mesh.space.backdrop(voxels.field.nodes)).reshape(-1)
+        backdrop = to_bricks(torch.from_numpy(mesh.space.backdrop(voxels.field.nodes)))
         alpha[backdrop.to(device)] = 1.0
         learned = voxels.field.parameters
         parameters = Parameters.starting_from(alpha, learned.features, learned.trained)
@@ -98,7 +100,7 @@ class FieldStage(Stage):
         device: str,
     ) -> "FieldStage":
         nodes, trained = state["nodes"], state["trained"].to(device)
-        n = nodes**3
+        n = places_in(nodes)
         nothing = torch.zeros(n, device=device), torch.zeros(n, 8, device=device)
         parameters = Parameters.starting_from(*nothing, trained)
         parameters.restore_rows(state["rows"])
@@ -110,7 +112,7 @@ class FieldStage(Stage):
         return stage
 
     def step(self) -> float:
-        batch = self._pool.draw(self.done, self.settings.field_batch, supersampled=False)
+        batch = self._batches.draw(self.done)
         sums = self._tracer.forward(batch, self._volume, binary_only=False)
         (F, A), (F_binary, A_binary) = sums
         for tensor in (F, A, F_binary, A_binary):

@@ -23,6 +23,7 @@ from core.kernels.surfaces import TEXEL_KERNELS, TexelGradients, Texels
 from core.kernels.types import vec8
 from core.mesh.quad_mesh import QuadMesh, patch_weights
 from core.presets import Settings
+from core.training.drawing import BatchSequence
 from core.training.field_stage import FieldStage, sampled, volume_of
 from core.training.loss import color_error, pixel_loss
 from core.training.pixels import PixelPool
@@ -57,7 +58,7 @@ class TexelStage(Stage):
     ) -> None:
         super().__init__(network, settings, settings.texel_steps, seed, device)
         self.mesh, self.parameters = mesh, parameters
-        self._pool = pool
+        self._batches = BatchSequence(pool, settings.texel_batch, supersampled=True)
         self._tracer = Tracer(mesh, TEXEL_KERNELS, settings.texel_batch, SUBRAYS, HIT_CAPACITY)
         self._texels = Texels()
         self._texels.K = settings.patch
@@ -108,7 +109,7 @@ class TexelStage(Stage):
 
     def step(self) -> float:
         both, with_alpha = self.fraction < CONTINUOUS_UNTIL, self.fraction < OPACITY_UNTIL
-        batch = self._pool.draw(self.done, self.settings.texel_batch, supersampled=True)
+        batch = self._batches.draw(self.done)
         (F, A), (F_binary, A_binary) = self._tracer.forward(batch, self._texels, binary_only=not both)
         for tensor in (F, A, F_binary, A_binary):
             tensor.requires_grad_()

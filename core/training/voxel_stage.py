@@ -12,11 +12,14 @@ import torch
 from torch import Tensor, nn
 
 from core.capture import Capture
+from core.device import torch_threads
 from core.field.network import shade
 from core.field.region import Region
 from core.field.space import CUBE, SHELLS, TAPER
 from core.field.voxels import EMPTY_DENSITY, HIGHEST_DENSITY, VoxelField
+from core.kernels.launch import THREADS
 from core.presets import Settings
+from core.training.drawing import BatchSequence
 from core.training.exposure import LEAST_SPREAD, BrightnessSurvey, exposure_differences, spread_of
 from core.training.loss import color_error, pixel_loss
 from core.training.marcher import Marcher
@@ -45,7 +48,7 @@ OPEN_SMOOTHNESS = 0.003
 # Rates fall to this share, exponentially. 0.03 costs 1 dB in 2000 steps, 0.3 gains 0.2.
 FINAL_RATE = 0.2
 DENSITY_DECAY = 0.05  # empty space must cost something; falls to nothing
-OCCUPANCY_INTERVAL = 100
+OCCUPANCY_INTERVAL = 200
 SMALLEST_IMAGE_PX = 100
 # Exposure is looked for before these levels. Earlier the field is too coarse; later it has learned part of it as shine.
 EVENED_LEVELS = (2, 3)
@@ -91,14 +94,15 @@ class VoxelStage(Stage):
         self._late_distortion = OPEN_LATE_DISTORTION if is_open else 1.0
         self._smoothness = OPEN_SMOOTHNESS if is_open else 0.0
         self._levels = levels_of(settings)
-        self._enter(VoxelField.new(region.space, self._levels[0].nodes, region.hull, seed, device))
+        self._enter(VoxelField.new(region.space, self._levels[0].nodes, region.hull, seed, device), self._levels[0])
 
-    def _enter(self, field: VoxelField) -> None:
+    def _enter(self, field: VoxelField, level: Level) -> None:
         self.field, self.marcher = field, Marcher(field, self.device)
         largest = max(max(view.camera.size_px) for view in self.capture.train)
         factor = min(round(largest / (PIXELS_PER_NODE * field.nodes)), largest // SMALLEST_IMAGE_PX)
         self._pool = PixelPool(self.capture.train, self.region.frame, self.device, max(1, factor), self.seed)
         self._pool.log_gains = self.log_gains
+        self._batches = BatchSequence(self._pool, level.batch, supersampled=False)
         self._steps_here = 0
 
     def _level(self) -> Level:
@@ -109,12 +113,14 @@ class VoxelStage(Stage):
         if level.nodes != self.field.nodes:
             if self._levels.index(level) in EVENED_LEVELS:
                 self._even_exposure()
-            self._enter(self.field.upsampled(level.nodes))
+            with torch_threads(THREADS):  # no kernel runs meanwhile
+                finer = self.field.upsampled(level.nodes)
+            self._enter(finer, level)
             self._update_occupancy(level)
         elif self._steps_here and self._steps_here % OCCUPANCY_INTERVAL == 0:
             self._update_occupancy(level)
         self._steps_here += 1
-        batch = self._pool.draw(self._steps_here, level.batch, supersampled=False)
+        batch = self._batches.draw(self._steps_here)
         rng = np.random.default_rng([self.seed, 2, self.done])
         jitter = torch.from_numpy(rng.random(level.batch, dtype=np.float32)).to(self.device)
         F, A = self.marcher.forward(batch.origins, batch.directions, jitter)
@@ -156,7 +162,8 @@ class VoxelStage(Stage):
             self.log_gains = more if self.log_gains is None else self.log_gains + more
 
     def _update_occupancy(self, level: Level) -> None:
-        self.field.update_occupancy(level.occupancy_cells, self.region.hull)
+        with torch_threads(THREADS):
+            self.field.update_occupancy(level.occupancy_cells, self.region.hull)
         self.marcher.refresh()
 
     def own_state(self) -> dict[str, Any]:
@@ -176,5 +183,5 @@ class VoxelStage(Stage):
         field.parameters = field.parameters.training(state["trained"].to(self.device))
         field.parameters.restore_rows(state["rows"])
         self.log_gains = None if state["log_gains"] is None else state["log_gains"].to(self.device)
-        self._enter(field)
+        self._enter(field, self._level())
         self._steps_here = state["steps_here"]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from core.field.bricks import from_bricks, places_in, to_bricks
 from core.field.parameters import Parameters
 from core.field.space import Space
 from core.field.voxels import EMPTY_DENSITY, VoxelField, _active_nodes
@@ -41,14 +42,14 @@ def test_exactly_the_nodes_that_samples_in_occupied_cells_read_train(rng, nodes,
     occupied = np.zeros((cells,) * 3, bool)
     occupied[tuple(rng.integers(0, cells, (3, 30)))] = True  # single cells: the thinnest parts
     occupied[[0, -1, 0, -1], [0, -1, -1, 0], [0, -1, 0, -1]] = True
-    active = np.zeros(nodes**3, bool)
-    active[_active_nodes(torch.from_numpy(occupied), nodes).numpy()] = True
-    np.testing.assert_array_equal(active, nodes_read(occupied, nodes))
+    active = torch.zeros(places_in(nodes), dtype=torch.bool)
+    active[_active_nodes(torch.from_numpy(occupied), nodes).long()] = True
+    np.testing.assert_array_equal(from_bricks(active, nodes).reshape(-1).numpy(), nodes_read(occupied, nodes))
 
 
 def field_with(density: np.ndarray, occupied=EVERYTHING) -> VoxelField:
     field = VoxelField.new(Space.cube(), len(density), occupied, 0, "cpu")
-    field.parameters.scalar.copy_(torch.from_numpy(density.astype(np.float32)).reshape(-1))
+    field.parameters.scalar.copy_(to_bricks(torch.from_numpy(density.astype(np.float32))))
     return field
 
 
@@ -57,7 +58,7 @@ def test_a_finer_grid_holds_the_same_field(rng):
     finer = field.upsampled(23)
     points = torch.from_numpy(rng.uniform(-1, 1, (500, 3)))
     at_nodes = torch.from_numpy(np.linspace(-1, 1, 23)[rng.integers(0, 23, (500, 3))])
-    old, new = (f.parameters.scalar.double().reshape(*(f.nodes,) * 3, 1) for f in (field, finer))
+    old, new = (from_bricks(f.parameters.scalar.double(), f.nodes)[..., None] for f in (field, finer))
     torch.testing.assert_close(trilinear(new, at_nodes), trilinear(old, at_nodes), atol=1e-6, rtol=0)  # float32
     assert float((trilinear(new, points) - trilinear(old, points)).abs().max()) < 0.4  # bends lie between its nodes
     assert finer.step < field.step

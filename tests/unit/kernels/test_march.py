@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from core.field.bricks import from_bricks, to_bricks
 from core.field.parameters import Parameters
 from core.field.space import Space
 from core.field.voxels import DENSITY_SCALE, EMPTY_DENSITY, VoxelField
@@ -23,7 +24,7 @@ def field_of(density: np.ndarray, features: np.ndarray, occupied: np.ndarray, de
     """A field from density [n, n, n], features [n, n, n, 8] and occupied [c, c, c]."""
     n = len(density)
     scalar, colours = (torch.from_numpy(a.astype(np.float32)).to(device) for a in (density, features))
-    parameters = Parameters.starting_from(scalar.reshape(-1), colours.reshape(-1, 8))
+    parameters = Parameters.starting_from(to_bricks(scalar), to_bricks(colours))
     return VoxelField(Space.cube(), n, parameters, torch.from_numpy(occupied).to(device))
 
 
@@ -60,8 +61,8 @@ def how_of(field: VoxelField) -> oracle.March:
 
 def exact_grids(field: VoxelField) -> tuple[torch.Tensor, torch.Tensor]:
     n = field.nodes
-    density = field.parameters.scalar.detach().cpu().double().reshape(n, n, n)
-    features = field.parameters.features.detach().cpu().double().reshape(n, n, n, 8)
+    density = from_bricks(field.parameters.scalar.detach().cpu().double(), n)
+    features = from_bricks(field.parameters.features.detach().cpu().double(), n)
     return density.requires_grad_(), features.requires_grad_()
 
 
@@ -101,7 +102,7 @@ def test_gradients_agree_with_autograd(rng, device, weight):
     for actual, wanted in ((grad_density, density.grad), (grad_features, features.grad)):
         scale = float(wanted.abs().max())
         # Samples that weigh less than 1e-4 leave the features alone: up to 1e-4 of the gradient each.
-        torch.testing.assert_close(actual.reshape(wanted.shape), wanted, atol=5e-4 * scale, rtol=0)
+        torch.testing.assert_close(from_bricks(actual, field.nodes), wanted, atol=5e-4 * scale, rtol=0)
 
 
 def test_rays_that_miss_the_cube_see_nothing_and_touch_nothing(rng, device):

@@ -5,6 +5,7 @@ import pytest
 import torch
 import warp as wp
 
+from core.field.bricks import from_bricks, places_in, to_bricks
 from core.field.parameters import Parameters
 from core.kernels.launch import launch
 from core.kernels.smoothness import smoothness_gradient, texel_smoothness_gradient
@@ -26,18 +27,18 @@ def pulled(parameters: Parameters, touched: torch.Tensor, device: str, weight: f
 
 
 def some_parameters(rng: np.random.Generator, share: float, device: str) -> Parameters:
-    features = torch.from_numpy(rng.random((N**3, 8), np.float32)).to(device)
-    trained = torch.from_numpy(np.flatnonzero(rng.random(N**3) < share).astype(np.int32)).to(device)
-    return Parameters.starting_from(torch.zeros(N**3, device=device), features, trained)
+    features = torch.from_numpy(rng.random((places_in(N), 8), np.float32)).to(device)
+    trained = to_bricks(torch.from_numpy(rng.random((N, N, N)) < share)).nonzero()[:, 0].to(torch.int32).to(device)
+    return Parameters.starting_from(torch.zeros(places_in(N), device=device), features, trained)
 
 
 @pytest.mark.parametrize("share", [1.0, 0.6, 0.1])
 def test_touched_rows_get_the_derivative_of_the_loss(rng, device, share):
     parameters = some_parameters(rng, share, device)
     touched = torch.from_numpy((rng.random(len(parameters.trained)) < 0.5).astype(np.uint8)).to(device)
-    grid = parameters.features.double().cpu().reshape(N, N, N, 8).requires_grad_()
-    (WEIGHT * smoothness_loss(grid, (parameters.row_of >= 0).cpu().reshape(N, N, N))).backward()
-    expected = grid.grad.reshape(-1, 8)[parameters.trained.long().cpu()].numpy() * touched.cpu().numpy()[:, None]
+    grid = from_bricks(parameters.features.double().cpu(), N).requires_grad_()
+    (WEIGHT * smoothness_loss(grid, from_bricks(parameters.row_of >= 0, N).cpu())).backward()
+    expected = to_bricks(grid.grad)[parameters.trained.long().cpu()].numpy() * touched.cpu().numpy()[:, None]
     # Sums of six differences of numbers up to 1, in float32.
     np.testing.assert_allclose(pulled(parameters, touched, device), expected, atol=1e-6)
 
@@ -51,10 +52,13 @@ def test_even_features_are_not_pulled(rng, device):
 
 def test_opposite_faces_of_the_grid_are_no_neighbours(rng, device):
     parameters = some_parameters(rng, 1.0, device)
-    parameters.features.zero_()
-    parameters.features.reshape(N, N, N, 8)[:, :, -1] = 1.0
+    features = torch.zeros(N, N, N, 8)
+    features[:, :, -1] = 1.0
+    parameters.features.copy_(to_bricks(features))
     touched = torch.ones(N**3, dtype=torch.uint8, device=device)
-    pull = pulled(parameters, touched, device).reshape(N, N, N, 8)
+    pull = np.zeros((places_in(N), 8), np.float32)
+    pull[parameters.trained.cpu()] = pulled(parameters, touched, device)
+    pull = from_bricks(torch.from_numpy(pull), N).numpy()
     assert not pull[:, :, 0].any()
     np.testing.assert_allclose(pull[:, :, -1], WEIGHT, rtol=1e-6)
 

@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from core.kernels.surfaces import TEXEL_KERNELS, Texels
+from core.kernels.trace import OPAQUE
 from core.mesh.quad_mesh import QuadMesh
 from core.oracles.trace import RayHits
 from core.oracles.trace import trace as exact_trace
@@ -222,7 +223,7 @@ def test_a_ray_ends_when_its_light_is_used_up(rng, device, binary_only):
     for index in range(len(rays[0])):
         quads = hits_of(everything, index)[0].numpy()
         opaque = np.cumsum(alpha[quads] > 0.5) >= 2
-        dark = np.cumprod(1 - alpha[quads]) < 1e-3
+        dark = np.cumprod(1 - alpha[quads]) < float(OPAQUE)
         over = opaque if binary_only else opaque & dark
         expected = quads[: int(np.argmax(over)) + 1] if over.any() else quads
         ended += len(expected) < len(quads)

@@ -4,6 +4,7 @@ import numpy as np
 import torch
 import warp as wp
 
+from core.field.bricks import from_bricks, places_in
 from core.kernels.launch import accumulator_parts
 from core.kernels.surfaces import GRAZING, VOLUME_KERNELS, Volume, VolumeGradients
 from core.kernels.types import vec8
@@ -22,20 +23,19 @@ SUBRAYS = 2
 
 def random_volume(rng: np.random.Generator, device: str) -> tuple[Volume, torch.Tensor, torch.Tensor]:
     """(volume as kernels read it, float64 opacity [n, n, n, 1] and features [n, n, n, 8] that want gradients)."""
-    alpha = rng.uniform(0.0, 1.0, (NODES**3,)).astype(np.float32)
-    features = rng.random((NODES**3, 8), np.float32)
+    alpha = rng.uniform(0.0, 1.0, (places_in(NODES),)).astype(np.float32)
+    features = rng.random((places_in(NODES), 8), np.float32)
     volume = Volume()
     volume.nodes = NODES
     volume.alpha = wp.array(alpha, dtype=float, device=device)
     volume.features = wp.array(features, dtype=vec8, device=device)
-    shape = (NODES,) * 3
-    exact = torch.from_numpy(alpha).double().reshape(*shape, 1), torch.from_numpy(features).double().reshape(*shape, 8)
+    exact = [from_bricks(torch.from_numpy(a).double(), NODES) for a in (alpha[:, None], features)]
     return volume, exact[0].requires_grad_(), exact[1].requires_grad_()
 
 
 def kernel_gradients(tracer: Tracer, batch, volume: Volume, grads) -> list[torch.Tensor]:
     """[opacity [n], features [n, 8], vertices [V, 3], touched [n]] of the tracer's last forward pass."""
-    device, n = tracer.device, NODES**3
+    device, n = tracer.device, places_in(NODES)
     parts, V = accumulator_parts(device), tracer.kernel_mesh.vertices.shape[0]
     alpha, features = torch.zeros(parts, n, device=device), torch.zeros(parts, n, 8, device=device)
     vertices, touched = torch.zeros(parts, V, 3, device=device), torch.zeros(n, dtype=torch.uint8, device=device)
@@ -84,9 +84,10 @@ def test_gradients_agree_with_autograd(rng, device):
     for found, wanted, tolerance in zip(actual, expected, (1e-4, 1e-4, 5e-4), strict=True):
         scale = float(wanted.abs().max())
         assert scale > 0.1
-        torch.testing.assert_close(found.reshape(wanted.shape), wanted, atol=tolerance * scale, rtol=0)
-    reached = (expected[0].reshape(-1) != 0) | (expected[1].reshape(-1, 8) != 0).any(1)
-    assert bool(touched[reached].all())
+        of_nodes = found if found.shape == wanted.shape else from_bricks(found, NODES).reshape(wanted.shape)
+        torch.testing.assert_close(of_nodes, wanted, atol=tolerance * scale, rtol=0)
+    reached = (expected[0] != 0).any(-1) | (expected[1] != 0).any(-1)
+    assert bool(from_bricks(touched, NODES)[reached].all())
 
 
 def test_sampling_is_trilinear_up_to_the_faces_of_the_cube(rng, device):

@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from core.errors import TrainingFailed
+from core.field.bricks import from_bricks
 from core.mesh.quad_mesh import VERTEX_REACH, QuadMesh, build_mesh, patch_weights
 from tests.unit.kernels.meshes import random_mesh
 
@@ -107,26 +108,35 @@ def test_patch_weights_lie_on_the_two_triangles(rng):
         np.testing.assert_allclose(points[i, j], expected, atol=1e-12)
 
 
+def in_order_of_cells(kernel, cells: int) -> tuple[np.ndarray, np.ndarray]:
+    """(slot, distance) of each cell, by its flat index."""
+    held = (torch.from_numpy(a.numpy()) for a in (kernel.cell_slot, kernel.cell_distance))
+    slot, distance = (from_bricks(places, cells).reshape(-1).numpy() for places in held)
+    return slot, distance
+
+
 def test_each_cell_lists_exactly_the_quads_that_use_its_vertex(rng):
     mesh = random_mesh(rng)
     kernel = mesh.kernel_mesh("cpu")
-    slot_of, start, listed = (a.numpy() for a in (kernel.cell_slot, kernel.slot_start, kernel.slot_quads))
+    start, listed = kernel.slot_start.numpy(), kernel.slot_quads.numpy()
+    slot_of, distance = in_order_of_cells(kernel, mesh.cells)
     for slot, cell in enumerate(mesh.kept):
         assert slot_of[cell] == slot
+        assert distance[cell] == 0
         quads = listed[start[slot] : start[slot + 1]]
         assert sorted(quads) == np.flatnonzero((mesh.quads == slot).any(1)).tolist()
         assert len(quads) <= 12
     empty = np.setdiff1d(np.arange(mesh.cells**3), mesh.kept)
-    assert (slot_of[empty] < 0).all()
+    assert (distance[empty] > 0).all()
 
 
 def test_empty_cells_tell_at_most_the_distance_to_the_nearest_kept_cell(rng):
     mesh = random_mesh(rng, cells=12, share=0.35)
-    slot_of = mesh.kernel_mesh("cpu").cell_slot.numpy()
+    _, distance = in_order_of_cells(mesh.kernel_mesh("cpu"), mesh.cells)
     kept = np.stack(np.unravel_index(mesh.kept, (12,) * 3), -1)
-    for cell in np.flatnonzero(slot_of < 0):
+    for cell in np.flatnonzero(distance):
         place = np.array(np.unravel_index(cell, (12,) * 3))
-        assert 1 <= -slot_of[cell] <= np.abs(kept - place).max(1).min()
+        assert 1 <= distance[cell] <= np.abs(kept - place).max(1).min()
 
 
 def test_the_kernels_mesh_sees_vertices_that_move(rng):

@@ -12,7 +12,10 @@ from core.kernels.types import vec8
 wp.set_module_options({"enable_backward": False})
 
 BETA1 = wp.constant(0.9)
-BETA2 = wp.constant(0.99)  # short memory: a texel meets few rays
+# Of nodes and vertices. At 0.99, a row's few touches decide alone how large its steps are: lego_400, mesh of 128 cells,
+# 600 steps of the field stage: 28.94 dB at 0.95, 29.27 at 0.99, 29.46 at 0.997, 29.48 at 0.999.
+BETA2 = wp.constant(0.997)
+TEXEL_BETA2 = wp.constant(0.99)  # short memory: a texel meets few rays
 EPSILON = wp.constant(1.0e-12)
 
 
@@ -33,7 +36,9 @@ class FeatureState:
 
 
 @wp.func
-def update_scalar(s: ScalarState, i: int, row: int, rate: float, decay: float, low: float, high: float, bias: wp.vec2):
+def update_scalar(
+    s: ScalarState, i: int, row: int, rate: float, decay: float, low: float, high: float, beta2: float, bias: wp.vec2
+):
     """One step of entry i, whose gradient and moments are in `row`, within [low, high]; its gradient is cleared.
 
     value -= rate * (m / sqrt(v) + decay)
@@ -43,7 +48,7 @@ def update_scalar(s: ScalarState, i: int, row: int, rate: float, decay: float, l
         g += s.grad[p, row]
         s.grad[p, row] = 0.0
     m = BETA1 * s.moment1[row] + (1.0 - BETA1) * g
-    v = BETA2 * s.moment2[row] + (1.0 - BETA2) * g * g
+    v = beta2 * s.moment2[row] + (1.0 - beta2) * g * g
     s.moment1[row] = m
     s.moment2[row] = v
     m_hat = m / bias[0]
@@ -52,14 +57,14 @@ def update_scalar(s: ScalarState, i: int, row: int, rate: float, decay: float, l
 
 
 @wp.func
-def update_features(s: FeatureState, i: int, row: int, rate: float, bias: wp.vec2):
+def update_features(s: FeatureState, i: int, row: int, rate: float, beta2: float, bias: wp.vec2):
     """One step of the eight features of entry i, within [0, 1], channel 0 from 1/255 (0 is a hole)."""
     g = vec8()
     for p in range(s.grad.shape[0]):
         g += s.grad[p, row]
         s.grad[p, row] = vec8()
     m = BETA1 * s.moment1[row] + (1.0 - BETA1) * g
-    v = BETA2 * s.moment2[row] + (1.0 - BETA2) * wp.cw_mul(g, g)
+    v = beta2 * s.moment2[row] + (1.0 - beta2) * wp.cw_mul(g, g)
     s.moment1[row] = m
     s.moment2[row] = v
     scale1 = rate / bias[0]
@@ -91,8 +96,8 @@ def adam_grid(
         return
     touched[row] = wp.uint8(0)
     i = trained[row]
-    update_scalar(scalars, i, row, scalar_rate, scalar_decay, low, high, bias)
-    update_features(features, i, row, feature_rate, bias)
+    update_scalar(scalars, i, row, scalar_rate, scalar_decay, low, high, BETA2, bias)
+    update_features(features, i, row, feature_rate, BETA2, bias)
 
 
 @wp.kernel
@@ -114,10 +119,10 @@ def adam_texels(
         return
     updates[i] = wp.min(updates[i] + 1, 10000)
     k = float(updates[i])
-    bias = wp.vec2(1.0 - wp.pow(BETA1, k), 1.0 - wp.pow(BETA2, k))
+    bias = wp.vec2(1.0 - wp.pow(BETA1, k), 1.0 - wp.pow(TEXEL_BETA2, k))
     if scalar_rate > 0.0:
-        update_scalar(scalars, i, i, scalar_rate, 0.0, 0.0, 1.0, bias)
-    update_features(features, i, i, feature_rate, bias)
+        update_scalar(scalars, i, i, scalar_rate, 0.0, 0.0, 1.0, TEXEL_BETA2, bias)
+    update_features(features, i, i, feature_rate, TEXEL_BETA2, bias)
 
 
 @wp.kernel
@@ -159,5 +164,5 @@ def adam_vertices(
 
 
 def bias_correction(steps: int) -> wp.vec2:
-    """(1 - beta1^steps, 1 - beta2^steps): what the moments lack after `steps` updates from zero."""
+    """(1 - beta1^steps, 1 - beta2^steps): what a node's moments lack after `steps` updates from zero."""
     return wp.vec2(1.0 - float(BETA1) ** steps, 1.0 - float(BETA2) ** steps)

@@ -65,7 +65,7 @@ PRESETS: dict[str, Settings] = {
         "balanced", cells=96, patch=7, nodes=256, voxel_steps=2600, field_steps=1600, texel_steps=4500
     ),
     # Most steps go where cells are fine: into the field stage (docs/training.md).
-    "high": Settings("high", cells=128, patch=7, nodes=256, voxel_steps=4000, field_steps=5000, texel_steps=1800),
+    "high": Settings("high", cells=128, patch=7, nodes=256, voxel_steps=3400, field_steps=5600, texel_steps=1800),
 }
 
 

@@ -12,9 +12,6 @@ from core.kernels.types import vec8
 wp.set_module_options({"enable_backward": False})
 
 BETA1 = wp.constant(0.9)
-# Of nodes and vertices. At 0.99, a row's few touches decide alone how large its steps are: lego_400, mesh of 128 cells,
-# 600 steps of the field stage: 28.94 dB at 0.95, 29.27 at 0.99, 29.46 at 0.997, 29.48 at 0.999.
-BETA2 = wp.constant(0.997)
 TEXEL_BETA2 = wp.constant(0.99)  # short memory: a texel meets few rays
 EPSILON = wp.constant(1.0e-12)
 
@@ -88,6 +85,7 @@ def adam_grid(
     scalar_decay: float,
     low: float,
     high: float,
+    beta2: float,
     bias: wp.vec2,
 ):
     """Steps the touched ones among the rows of a grid."""
@@ -96,8 +94,8 @@ def adam_grid(
         return
     touched[row] = wp.uint8(0)
     i = trained[row]
-    update_scalar(scalars, i, row, scalar_rate, scalar_decay, low, high, BETA2, bias)
-    update_features(features, i, row, feature_rate, BETA2, bias)
+    update_scalar(scalars, i, row, scalar_rate, scalar_decay, low, high, beta2, bias)
+    update_features(features, i, row, feature_rate, beta2, bias)
 
 
 @wp.kernel
@@ -137,6 +135,7 @@ def adam_vertices(
     reach: float,
     rate: float,
     pull: float,
+    beta2: float,
     bias: wp.vec2,
 ):
     """Steps the vertices, keeps each within `reach` of its cell's centre, and pulls it back there a little (eq. 6).
@@ -152,7 +151,7 @@ def adam_vertices(
         return
     g = gradient_in_cells(space, value[i], g)
     m = BETA1 * moment1[i] + (1.0 - BETA1) * g
-    v = BETA2 * moment2[i] + (1.0 - BETA2) * wp.cw_mul(g, g)
+    v = beta2 * moment2[i] + (1.0 - beta2) * wp.cw_mul(g, g)
     moment1[i] = m
     moment2[i] = v
     x = to_cells(space, value[i]) - centre[i]
@@ -163,6 +162,6 @@ def adam_vertices(
     value[i] = from_cells(space, centre[i] + x)
 
 
-def bias_correction(steps: int) -> wp.vec2:
-    """(1 - beta1^steps, 1 - beta2^steps): what a node's moments lack after `steps` updates from zero."""
-    return wp.vec2(1.0 - float(BETA1) ** steps, 1.0 - float(BETA2) ** steps)
+def bias_correction(steps: int, beta2: float) -> wp.vec2:
+    """(1 - beta1^steps, 1 - beta2^steps): what moments lack after `steps` updates from zero."""
+    return wp.vec2(1.0 - float(BETA1) ** steps, 1.0 - beta2**steps)

@@ -34,13 +34,16 @@ from core.training.voxel_stage import VoxelStage
 FEATURE_RATE, ALPHA_RATE, NETWORK_RATE = 0.01, 0.02, 2e-3
 VERTEX_RATE = 0.02  # in cells
 VERTEX_PULL = 1e-4
+# A node or vertex is touched once in a dozen steps: with a short memory its last few gradients alone say how large its
+# steps are. lego_400, 600 steps, baked: 28.94 dB at 0.95, 29.27 at 0.99, 29.46 at 0.997, 29.48 at 0.999.
+BETA2 = 0.997
 FINAL_RATE = 0.1
 HIT_CAPACITY = 24
 SURVEY_RAYS, SURVEY_BATCH = 400_000, 8192
 SOLID_WEIGHT = 0.002  # 0.01 leaves out thin parts (-0.3 dB on lego_400), 0.1 leaves holes (-3 dB)
 OPEN_SOLID_WEIGHT = 0.01  # without alpha there is haze: at 0.002 fox began with 570,000 quads, and lost 2 dB
 SEEN_WEIGHT = 0.03
-BINARY_SHARE = (0.2, 0.8)  # of the loss, from the first step to the last
+BINARY_SHARE = (0.1, 0.6)  # of the loss, from the first step to the last; (0.2, 0.8) 0.07 dB less, (0.4, 0.9) 0.26
 PRUNING_STARTS = 0.75
 
 
@@ -128,7 +131,7 @@ class FieldStage(Stage):
         soft, hard = (tuple(self.gradient(x, len(A)) for x in pair) for pair in ((F, A), (F_binary, A_binary)))
         self._tracer.backward(batch, self._volume, soft, hard, self._gradients, self.parameters.parts)
         rates = (ALPHA_RATE * falling, FEATURE_RATE * falling)
-        step_grid(self.parameters, self._touched, rates, 0.0, (0.0, 1.0),
+        step_grid(self.parameters, self._touched, rates, 0.0, (0.0, 1.0), BETA2,
                   self.done + 1, self.device)  # fmt: skip
         self._step_vertices(VERTEX_RATE * self.mesh.cell_size * falling)
         if self.fraction >= PRUNING_STARTS or self.done + 1 == self.steps:
@@ -141,7 +144,7 @@ class FieldStage(Stage):
         value, m1, m2, centres = (as_vec3(tensor) for tensor in state)
         grad = as_vec3(self._vertex_grad)
         inputs = [self._kernel_space, value, grad, m1, m2, centres, reach, rate, VERTEX_PULL,
-                  bias_correction(self.done + 1)]  # fmt: skip
+                  BETA2, bias_correction(self.done + 1, BETA2)]  # fmt: skip
         launch(adam_vertices, len(self.mesh.kept), inputs, self.device)
         self._tracer.vertices_moved()
 

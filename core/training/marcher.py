@@ -76,8 +76,10 @@ class Marcher:
         ]  # fmt: skip
         launch(smoothness_gradient, len(learned.trained), inputs, self.device)
 
-    def adam(self, rates: tuple[float, float], decay: float, bounds: tuple[float, float], steps: int) -> None:
-        step_grid(self.field.parameters, self._touched, rates, decay, bounds, steps, self.device)
+    def adam(
+        self, rates: tuple[float, float], decay: float, bounds: tuple[float, float], beta2: float, steps: int
+    ) -> None:
+        step_grid(self.field.parameters, self._touched, rates, decay, bounds, beta2, steps, self.device)
 
     def _allocate(self, rays: int) -> None:
         self._rays = rays
@@ -100,13 +102,14 @@ def step_grid(
     rates: tuple[float, float],
     decay: float,
     bounds: tuple[float, float],
+    beta2: float,
     steps: int,
     device: str,
 ) -> None:
-    """One Adam step of the touched rows. Args: rates: of scalar and features. bounds: of the scalar."""
+    """One Adam step of the touched rows. Args: rates: of scalar and features. bounds: of the scalar. beta2: Adam's."""
     inputs = [
         wp.from_torch(parameters.trained), wp.from_torch(touched),
         parameters.scalar_state(), parameters.feature_state(),
-        rates[0], rates[1], decay, bounds[0], bounds[1], bias_correction(steps),
+        rates[0], rates[1], decay, bounds[0], bounds[1], beta2, bias_correction(steps, beta2),
     ]  # fmt: skip
     launch(adam_grid, len(parameters.trained), inputs, device)

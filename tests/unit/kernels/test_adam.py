@@ -8,12 +8,13 @@ import warp as wp
 from core.field.frame import as_vec3
 from core.field.parameters import Parameters
 from core.field.space import Space
-from core.kernels.adam import BETA1, BETA2, TEXEL_BETA2, adam_texels, adam_vertices, bias_correction
+from core.kernels.adam import BETA1, TEXEL_BETA2, adam_texels, adam_vertices, bias_correction
 from core.kernels.launch import accumulator_parts, launch
 from core.oracles.adam import LazyAdam
 from core.training.marcher import step_grid
 
 N = 60
+BETA2 = 0.997  # of grids and vertices
 LOWEST_CHANNEL0 = 1 / 255
 # A step is m / sqrt(v) times the rate: 1e-6 relative in float32, and gradients near 0 lose a digit more.
 TOLERANCE = 2e-5
@@ -75,7 +76,7 @@ def test_grid_steps_agree_on_touched_rows_and_leave_the_other_entries(rng, devic
         rows = np.sort(rng.choice(len(trained), 20, replace=False))
         scalar_grad, feature_grad = add_gradients(rng, parameters, rows)
         touched[torch.from_numpy(rows)] = 1
-        step_grid(parameters, touched, (0.05, 0.04), 0.2, (-0.25, 0.9), steps, device)
+        step_grid(parameters, touched, (0.05, 0.04), 0.2, (-0.25, 0.9), BETA2, steps, device)
         index = trained[rows].astype(int)
         scalar.step(index, scalar_grad, 0.05, low=-0.25, high=0.9, decay=0.2, steps=steps)
         step_features(features, index, feature_grad, 0.04, steps)
@@ -91,7 +92,7 @@ def test_values_stay_within_their_ranges(rng, device, sign):
         for accumulator in parameters.gradients:
             accumulator.fill_(sign * 1e6)
         touched = torch.ones(N, dtype=torch.uint8, device=device)
-        step_grid(parameters, touched, (0.9, 0.9), 0.0, (-0.25, 30.0), steps, device)
+        step_grid(parameters, touched, (0.9, 0.9), 0.0, (-0.25, 30.0), BETA2, steps, device)
     assert float(parameters.features.min()) >= 0.0
     assert float(parameters.features.max()) <= 1.0
     assert float(parameters.features[:, 0].min()) >= np.float32(LOWEST_CHANNEL0)
@@ -171,7 +172,12 @@ class VertexSteps:
         self.steps += 1
         arrays = [as_vec3(t) for t in (self.value, self.grad, *self.moments, self.centres)]
         space = Space.cube().kernel_space()
-        launch(adam_vertices, N, [space, *arrays, self.REACH, rate, pull, bias_correction(self.steps)], self.device)
+        launch(
+            adam_vertices,
+            N,
+            [space, *arrays, self.REACH, rate, pull, BETA2, bias_correction(self.steps, BETA2)],
+            self.device,
+        )
 
 
 def test_vertex_steps_agree_and_leave_vertices_without_gradient(rng, device):

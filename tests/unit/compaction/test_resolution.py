@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from exporters.compaction.resolution import Trade, overlaps, shrunk, sides, size_options
+from exporters.compaction.resampling import overlaps, shrunk
+from exporters.compaction.resolution import Trade, sides, size_options
 
 STEPS = 4000  # of the oracle's lookups along an axis
 

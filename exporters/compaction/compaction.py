@@ -16,7 +16,7 @@ from exporters.compaction.resampling import shrunk
 from exporters.compaction.resolution import SizeOptions, Trade, best_sizes, size_options
 from exporters.compaction.sharing import with_constant_axes_collapsed, with_equal_patches_shared, without_empty
 from exporters.compaction.surface import surface_points
-from exporters.threads import mapped
+from exporters.threads import mapped, products_on_one_thread
 
 T = TypeVar("T")
 SAMPLE_POINTS = 40_000
@@ -69,6 +69,11 @@ def compacted(scene: BakedScene, quality: Quality = WEB) -> BakedScene:
     Features are recoded and rounded (recoding.py), patches take the resolution that they need (resolution.py), and what
     `repacked` does is done. Features under holes are no longer zero, but for the first.
     """
+    with products_on_one_thread():
+        return _compacted(scene, quality)
+
+
+def _compacted(scene: BakedScene, quality: Quality) -> BakedScene:
     seen = surface_points(scene, SAMPLE_POINTS)
     if len(seen.features_u8) == 0:
         return repacked(scene)

@@ -17,7 +17,7 @@ CHANNELS = FEATURE_CHANNELS + 3  # features, then the fallback's colour
 # How far, in texels, a corner may be from a texel's centre: float32 on 4096 texels gives 2e-4, other tools' decimals
 # 2e-3.
 OFF_CENTRE = 0.01
-TEXELS_AT_ONCE = 1 << 18  # 3 MB, or 10 MB of moments; with less, small steps of threads wait for each other
+TEXELS_AT_ONCE = 1 << 17  # 1.5 MB, or 5 MB of moments; with less, small steps take longer, and wait for each other
 
 
 @dataclass(frozen=True)

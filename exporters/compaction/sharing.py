@@ -7,6 +7,7 @@ import numpy as np
 from core.conventions import is_opaque
 from exporters.compaction.quads import CHANNELS, TEXELS_AT_ONCE, Patches, Quads, slices
 from exporters.compaction.windows import as_bytes, as_items, windows
+from exporters.threads import mapped
 
 DIGEST_BYTES = 16  # two different patches never meet
 LOOKED_AT = 8  # texels
@@ -22,12 +23,19 @@ def without_empty(quads: Quads) -> Quads:
 
 def with_constant_axes_collapsed(patches: Patches) -> Patches:
     """A patch whose rows (columns) are all equal has one: every lookup finds the same."""
+    groups = list(patches.groups())
     sizes = patches.sizes.copy()
-    for numbers in patches.groups():
-        texels = patches.content(numbers)
-        sizes[numbers, 0] = np.where(_all_equal(texels), 1, sizes[numbers, 0])
-        sizes[numbers, 1] = np.where(_all_equal(texels.swapaxes(1, 2)), 1, sizes[numbers, 1])
+    for numbers, collapsed in zip(groups, mapped(lambda some: _collapsed(patches.content(some)), groups), strict=True):
+        sizes[numbers] = collapsed
     return patches if np.array_equal(sizes, patches.sizes) else cropped(patches, np.arange(len(sizes)), sizes)
+
+
+def _collapsed(texels: np.ndarray) -> np.ndarray:
+    """[n, 2] sizes of patches [n, h, w, c] without the rows and columns that repeat the first."""
+    _, height, width, _ = texels.shape
+    return np.stack(
+        [np.where(_all_equal(texels), 1, height), np.where(_all_equal(texels.swapaxes(1, 2)), 1, width)], 1
+    )
 
 
 def _all_equal(texels: np.ndarray) -> np.ndarray:

@@ -12,11 +12,10 @@ from exporters.invalid import invalid
 # Measured on lego at 400 px for the web, three images of 2048², one core: method 0 quality 0 takes 0.8 s for 15.8 MB,
 # 1 and 0 2.2 s for 13.7, 2 and 40 3.3 s for 13.0, 4 and 50 3.8 s for 12.9; 6 and 100 ten times as long for a percent.
 METHOD, EFFORT = 2, 40
-# For the largest scenes. On a quarter of a page of benchmarks/big_scene.py, and on lego_100, seconds and MB: 2 and 40
-# 3.6 s 11.29 MB, 0.8 s 2.05 MB; 3 and 0 1.9 s 11.38 MB, 0.5 s 2.17 MB; 1 and 0 1.6 s 11.55 MB, 0.5 s 2.18 MB;
-# 0 and 0 1.0 s 13.34 MB, 0.2 s 2.73 MB. From quality 25 on libwebp searches twice.
-QUICK_METHOD, QUICK_EFFORT = 3, 0
-QUICK_FROM_TEXELS = 1 << 23  # of a scene, half a full page; beyond it, pages take longer than people wait for 1 to 6 %
+# For the largest scenes: see exporters/vp8l for what takes a fifth of the time yet. On a page of benchmarks/big_scene.py,
+# CPU seconds and MB: 2 and 40 14.1 s 44.9 MB; 3 and 0 7.2 s 45.8 MB; 1 and 0 6.6 s 46.0 MB; 0 and 0 3.5 s 53.3 MB.
+QUICK_METHOD, QUICK_EFFORT = 1, 0
+QUICK_FROM_TEXELS = 1 << 23  # of a scene, half a full page; beyond it, pages take longer than people wait for some percent
 
 _SIGNATURE = struct.Struct("<4sI4s4sIBI")  # RIFF, length, WEBP, VP8L, length, 0x2f, sizes
 _ONE_BYTE_MARK = 0x2F
@@ -33,7 +32,7 @@ def encode_webp(image: np.ndarray, *, exact: bool = True, quick: bool = False) -
 
     Args:
         exact: every byte is kept. Without, colours under alpha 0 become what compresses best.
-        quick: 1 to 6 % larger, in half the time.
+        quick: 3 to 6 % larger, in half the time.
     """
     file = io.BytesIO()
     method, effort = (QUICK_METHOD, QUICK_EFFORT) if quick else (METHOD, EFFORT)

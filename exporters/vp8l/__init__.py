@@ -1,0 +1,5 @@
+"""Lossless WebP in a quarter of libwebp's time, for images so large that a few percent of bytes are worth less."""
+
+from exporters.vp8l.encoder import encode_vp8l
+
+__all__ = ["encode_vp8l"]

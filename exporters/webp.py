@@ -12,10 +12,12 @@ from exporters.invalid import invalid
 # Measured on lego at 400 px for the web, three images of 2048², one core: method 0 quality 0 takes 0.8 s for 15.8 MB,
 # 1 and 0 2.2 s for 13.7, 2 and 40 3.3 s for 13.0, 4 and 50 3.8 s for 12.9; 6 and 100 ten times as long for a percent.
 METHOD, EFFORT = 2, 40
-# For the largest scenes: see exporters/vp8l for what takes a fifth of the time yet. On a page of benchmarks/big_scene.py,
-# CPU seconds and MB: 2 and 40 14.1 s 44.9 MB; 3 and 0 7.2 s 45.8 MB; 1 and 0 6.6 s 46.0 MB; 0 and 0 3.5 s 53.3 MB.
+# For the largest scenes; exporters/vp8l takes a fifth of the time yet. On a page of benchmarks/big_scene.py, s and MB:
+# 2 and 40 14.1 s 44.9 MB; 3 and 0 7.2 s 45.8 MB; 1 and 0 6.6 s 46.0 MB; 0 and 0 3.5 s 53.3 MB.
 QUICK_METHOD, QUICK_EFFORT = 1, 0
-QUICK_FROM_TEXELS = 1 << 23  # of a scene, half a full page; beyond it, pages take longer than people wait for some percent
+QUICK_FROM_TEXELS = (
+    1 << 23
+)  # of a scene, half a full page; beyond it, pages take longer than people wait for some percent
 
 _SIGNATURE = struct.Struct("<4sI4s4sIBI")  # RIFF, length, WEBP, VP8L, length, 0x2f, sizes
 _ONE_BYTE_MARK = 0x2F

@@ -13,7 +13,7 @@ from exporters.compaction.packing import packed
 from exporters.compaction.quads import CHANNELS, Patches, Quads, joined, quads_of
 from exporters.compaction.recoding import Recoding, recoding_of, widened
 from exporters.compaction.resampling import shrunk
-from exporters.compaction.resolution import SizeOptions, Trade, best_sizes, size_options
+from exporters.compaction.resolution import LEADING, SizeOptions, Trade, best_sizes, picked, size_options
 from exporters.compaction.sharing import with_constant_axes_collapsed, with_equal_patches_shared, without_empty
 from exporters.compaction.surface import surface_points
 from exporters.threads import mapped, products_on_one_thread
@@ -215,17 +215,18 @@ def _reduced(quads: Quads, mean_area: float, recoding: Recoding, trade: Trade, q
 
     None where none is.
     """
-    weight, leading = _patch_weights(quads, mean_area), np.argsort(-recoding.deviation)
+    weight, channels = _patch_weights(quads, mean_area), np.argsort(-recoding.deviation)[:LEADING]
 
     def reduced(some: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Patches of one size as (numbers [n], texels [n, h, w, 11]), of one new size each."""
         texels = quads.patches.content(some)
         y, opaque = recoding.coordinates(texels[..., :FEATURE_CHANNELS]), is_opaque(texels)
-        best = best_sizes(y[..., leading], opaque, quality.most, quality.hole_cost, weight[some], trade)
+        best = best_sizes(y, opaque, quality.most, quality.hole_cost, weight[some], trade, channels)
         found = []
         for height, width in np.unique(best[best[:, 0] > 0], axis=0):
-            here = (best == (height, width)).all(1)
-            found.append((some[here], _resized(texels[here], y[here], (height, width), recoding, quality)))
+            here = np.flatnonzero((best == (height, width)).all(1))
+            resized = _resized(picked(texels, here), picked(y, here), (height, width), recoding, quality)
+            found.append((some[here], resized))
         return found
 
     parts = [part for group in mapped(reduced, quads.patches.groups()) for part in group]

@@ -62,7 +62,9 @@ class Recoding:
 
     def coordinates(self, features_u8: np.ndarray) -> np.ndarray:
         """y [..., 8] of stored features [..., 8], float32."""
-        rows = features_u8.reshape(-1, FEATURE_CHANNELS).astype(np.float32)  # one product: a stack of small ones is slow
+        rows = features_u8.reshape(-1, FEATURE_CHANNELS).astype(
+            np.float32
+        )  # one product: a stack of small ones is slow
         scaled: np.ndarray = rows @ (self.matrix / 255.0).astype(np.float32)
         return scaled.reshape(features_u8.shape)
 

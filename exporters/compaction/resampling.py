@@ -42,6 +42,7 @@ def integrals(values: np.ndarray, size: Size) -> np.ndarray:
     return _along_columns(_along_rows(values, size[0]), size[1])
 
 
+@lru_cache(maxsize=256)
 def cells(size: Size) -> np.ndarray:
     """[h', w'] the area of each texel."""
     height, width = (np.diff(_borders(side)) for side in size)

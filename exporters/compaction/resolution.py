@@ -9,13 +9,16 @@ has 0.3 % (lego_100) to 1.2 % (fox) fewer bytes and the search takes five times 
 Most patches of trained scenes stay as large as they are, which some channels tell (`best_sizes`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from exporters.compaction.resampling import Size, cells, integrals, with_patches_last
 
-LEADING = 2  # channels that are looked at first; with 1, 8 % of lego_100's patches have to be looked at again, with 2, 5 %
+LEADING = (
+    2  # channels that are looked at first; with 1, 8 % of lego_100's patches have to be looked at again, with 2, 5 %
+)
 BITS_A_QUAD = 110.0  # four vertices and two triangles, compressed; measured
 
 
@@ -59,24 +62,37 @@ class SizeOptions:
 
 
 def best_sizes(
-    y: np.ndarray, opaque: np.ndarray, most: float, hole_cost: float, weight: np.ndarray, trade: Trade
+    y: np.ndarray,
+    opaque: np.ndarray,
+    most: float,
+    hole_cost: float,
+    weight: np.ndarray,
+    trade: Trade,
+    channels: Sequence[int] = (0, 1),
 ) -> np.ndarray:
     """int64 [n, 2]: what `size_options(y, opaque, most, hole_cost).best(weight, trade)` chooses.
 
     Where patches may stay as they are, without any error, a size that loses to that on some channels loses on all of
-    them, since no channel's error is below 0. So the first channels of y, which should be those that vary most, rule
-    out most of the patches, and holes alone most of those that are cut.
+    them, since no channel's error is below 0. So a few channels, best those that vary most, rule out most of the
+    patches, and holes alone most of those that are cut.
     """
     size = opaque.shape[1:]
     best = np.tile(np.array(size), (len(opaque), 1))
     whole = opaque.all((1, 2))
-    for some, leading in ((np.flatnonzero(whole), LEADING), (np.flatnonzero(~whole), 0)):
+    for some, few in ((np.flatnonzero(whole), list(channels)), (np.flatnonzero(~whole), [])):
         if most >= 1 and len(some):
-            found, _ = size_options(y[some, ..., :leading], opaque[some], most, hole_cost).best(weight[some], trade)
-            some = some[(found != size).any(1)]
+            leading = np.stack([picked(y[..., c], some) for c in few], -1) if few else np.empty((len(some), *size, 0))
+            options = size_options(leading, picked(opaque, some), most, hole_cost)
+            some = some[(options.best(weight[some], trade)[0] != size).any(1)]
         if len(some):
-            best[some], _ = size_options(y[some], opaque[some], most, hole_cost).best(weight[some], trade)
+            options = size_options(picked(y, some), picked(opaque, some), most, hole_cost)
+            best[some] = options.best(weight[some], trade)[0]
     return best
+
+
+def picked(values: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """values[numbers]; values themselves where these are all, in order."""
+    return values if len(numbers) == len(values) else values[numbers]
 
 
 def size_options(y: np.ndarray, opaque: np.ndarray, most: float, hole_cost: float) -> SizeOptions:

@@ -33,9 +33,7 @@ def with_constant_axes_collapsed(patches: Patches) -> Patches:
 def _collapsed(texels: np.ndarray) -> np.ndarray:
     """[n, 2] sizes of patches [n, h, w, c] without the rows and columns that repeat the first."""
     _, height, width, _ = texels.shape
-    return np.stack(
-        [np.where(_all_equal(texels), 1, height), np.where(_all_equal(texels.swapaxes(1, 2)), 1, width)], 1
-    )
+    return np.stack([np.where(_all_equal(texels), 1, height), np.where(_all_equal(texels.swapaxes(1, 2)), 1, width)], 1)
 
 
 def _all_equal(texels: np.ndarray) -> np.ndarray:
@@ -82,7 +80,11 @@ def _first_equal(patches: Patches) -> np.ndarray:
     raw = patches.texels.reshape(-1).data
     found: dict[tuple[int, bytes], int] = {}  # by height and content
     for number, height, start, end in zip(
-        again.tolist(), heights.tolist(), (CHANNELS * starts).tolist(), (CHANNELS * (starts + areas)).tolist(), strict=True
+        again.tolist(),
+        heights.tolist(),
+        (CHANNELS * starts).tolist(),
+        (CHANNELS * (starts + areas)).tolist(),
+        strict=True,
     ):
         key = (height, blake2b(raw[start:end], digest_size=DIGEST_BYTES).digest())
         first[number] = found.setdefault(key, number)
@@ -93,6 +95,8 @@ def _looks(patches: Patches) -> np.ndarray:
     """[N] items that are equal wherever patches are: their sizes and some texels."""
     looks = np.empty((len(patches.sizes), LOOKED_AT), np.dtype((np.void, CHANNELS)))
     for column, share in enumerate(np.linspace(0, 1, LOOKED_AT)):
-        looks[:, column] = windows(patches.texels, 1)[patches.offsets + np.rint(share * (patches.areas - 1)).astype(int)]
+        looks[:, column] = windows(patches.texels, 1)[
+            patches.offsets + np.rint(share * (patches.areas - 1)).astype(int)
+        ]
     sizes = patches.sizes.astype(np.uint16).view(np.uint8)
     return as_items(np.concatenate([sizes, as_bytes(looks).reshape(len(looks), -1)], 1), 1)

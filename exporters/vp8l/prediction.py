@@ -2,9 +2,9 @@
 
 import numpy as np
 
-LEFT, TOP, MEAN_OF_TWO, MEAN_OF_FOUR = 1, 2, 7, 10  # of VP8L's fourteen modes those that noisy texels choose
-MODES = (LEFT, TOP, MEAN_OF_TWO, MEAN_OF_FOUR)
-_FIRST = np.array([0, 0, 0, 255], np.uint8)  # what the first pixel is predicted to be
+BLACK, LEFT, TOP, MEAN_OF_TWO, MEAN_OF_FOUR = 0, 1, 2, 7, 10  # of VP8L's fourteen modes those that noisy texels choose
+MODES = (LEFT, TOP, MEAN_OF_TWO, MEAN_OF_FOUR, BLACK)
+_BLACK = np.array([0, 0, 0, 255], np.uint8)  # the first pixel's prediction, too
 
 
 def residuals(rows: np.ndarray, above: np.ndarray | None, mode: int) -> np.ndarray:
@@ -17,7 +17,7 @@ def residuals(rows: np.ndarray, above: np.ndarray | None, mode: int) -> np.ndarr
     """
     result = np.empty_like(rows)
     if above is None:
-        result[0, 0] = rows[0, 0] - _FIRST
+        result[0, 0] = rows[0, 0] - _BLACK
         result[0, 1:] = rows[0, 1:] - rows[0, :-1]
         above, rows, rest = rows[0], rows[1:], result[1:]
     else:
@@ -30,8 +30,10 @@ def residuals(rows: np.ndarray, above: np.ndarray | None, mode: int) -> np.ndarr
 
 
 def _predicted(rows: np.ndarray, upper: np.ndarray, mode: int) -> np.ndarray:
-    """[h, w - 1, 4] for all but the first column, from rows and those above each."""
+    """[h, w - 1, 4], or [4], for all but the first column, from rows and those above each."""
     left, top = rows[:, :-1], upper[:, 1:]
+    if mode == BLACK:
+        return _BLACK
     if mode == LEFT:
         return left
     if mode == TOP:

@@ -11,6 +11,8 @@ MOST_BITS = 15
 MOST_LENGTH_BITS = 7  # of the code of code lengths
 LENGTH_ORDER = (17, 18, 0, 1, 2, 3, 4, 5, 16, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 
+_Node = tuple[int, int, tuple[int, ...]]  # how often; a name, so that ties are broken alike; its symbols
+
 
 @dataclass(frozen=True)
 class PrefixCode:
@@ -44,7 +46,7 @@ def _lengths(counts: np.ndarray, most_bits: int) -> np.ndarray:
 
 def _depths(counts: np.ndarray) -> np.ndarray:
     """[a] depths in Huffman's tree; 1 for a symbol that is alone."""
-    heap = [(int(counts[symbol]), int(symbol), (int(symbol),)) for symbol in np.flatnonzero(counts)]
+    heap: list[_Node] = [(int(counts[symbol]), symbol, (symbol,)) for symbol in np.flatnonzero(counts).tolist()]
     depths = np.zeros(len(counts), np.int64)
     if len(heap) == 1:
         depths[heap[0][1]] = 1

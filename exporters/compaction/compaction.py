@@ -203,10 +203,15 @@ def _patch_weights(quads: Quads, mean_area: float) -> np.ndarray:
 
 
 def _reduced_in_turn(parts: list[Quads], recoding: Recoding, trade: Trade, quality: Quality) -> list[Quads]:
-    """`_reduced` of each, where anything is left; takes them from the list to keep little in memory."""
-    mean_area, found = _mean_area(parts), []
-    while parts:
-        found.append(_reduced(parts.pop(0), mean_area, recoding, trade, quality))
+    """`_reduced` of each, where anything is left; takes them from the list to keep little in memory.
+
+    Several pages at a time, although each takes every core: not all that is done to a page does.
+    """
+    mean_area, waiting = _mean_area(parts), dict(enumerate(parts))
+    parts.clear()
+    found = mapped(
+        lambda number: _reduced(waiting.pop(number), mean_area, recoding, trade, quality), range(len(waiting))
+    )
     return [quads for quads in found if quads is not None]
 
 
@@ -215,7 +220,7 @@ def _reduced(quads: Quads, mean_area: float, recoding: Recoding, trade: Trade, q
 
     None where none is.
     """
-    weight, channels = _patch_weights(quads, mean_area), np.argsort(-recoding.deviation)[:LEADING]
+    weight, channels = _patch_weights(quads, mean_area), np.argsort(-recoding.deviation)[:LEADING].tolist()
 
     def reduced(some: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Patches of one size as (numbers [n], texels [n, h, w, 11]), of one new size each."""

@@ -1,4 +1,4 @@
-"""Lossless WebP in a quarter of libwebp's time, for images so large that a few percent of bytes are worth less."""
+"""Lossless WebP in a fifth of libwebp's time, for images so large that a few percent of bytes are worth less."""
 
 from exporters.vp8l.encoder import encode_vp8l
 

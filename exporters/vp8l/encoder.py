@@ -3,7 +3,7 @@
 No references back to earlier pixels, no colour cache, no colour transform: libwebp's search for these and among
 predictors takes most of its time. Here all is arithmetic on arrays.
 
-Measured on a page of benchmarks/big_scene.py, features 0-3, 4-7 and colour, MB: 12.06 19.82 20.84 in 0.4 to 0.55 s each;
+Measured on a page of benchmarks/big_scene.py, features 0-3, 4-7 and colour, MB: 12.06 19.82 20.84 in 0.3 to 0.6 s;
 libwebp's method 1 8.17 18.39 19.43 in 1.6 to 2.8 s, its method 0 9.02 22.34 21.91 in 1.0 to 1.4 s. Without references
 and a cache, quiet channels take a bit each: such images, and most of lego_100's (a sixth to a third larger here), stay
 with libwebp (`exporters.gltf.compressed`). Subtracting green made colours larger: 5.2 for 4.7 MB a quarter page.

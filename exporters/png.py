@@ -50,9 +50,9 @@ def encode_png(image: np.ndarray) -> bytes:
     return data if len(band) == len(image) else _encoded(image, *strategy)
 
 
-def middle_band(image: np.ndarray, texels: int = BAND_TEXELS) -> np.ndarray:
-    """The rows that codings are tried on, about so many texels."""
-    rows = max(1, texels // image.shape[1])
+def middle_band(image: np.ndarray) -> np.ndarray:
+    """The rows that codings are tried on."""
+    rows = max(1, BAND_TEXELS // image.shape[1])
     first = max(0, (len(image) - rows) // 2)
     return image[first : first + rows]
 

@@ -15,8 +15,7 @@ from exporters.gltf.quantization import steps_of
 from exporters.gltf.storage import IMAGES_PER_PAGE, NamedImage, accessor, corners, index_types, primitive
 from exporters.png import encode_png, middle_band
 from exporters.threads import mapped
-from exporters.vp8l import encode_vp8l
-from exporters.webp import QUICK_FROM_TEXELS, encode_webp
+from exporters.webp import encode_webp
 
 QUANTIZATION = "KHR_mesh_quantization"
 # A texture coordinate is (x + 1/2) / 4096 or a coarser one: 13 bits and a sign, exactly.
@@ -24,9 +23,8 @@ TEXCOORD_BITS = 15
 # Of a float position's largest coordinate, where the scene is too wide for whole steps.
 POSITION_BITS = 18
 
-# How much larger images of the largest scenes may be to be coded in a fifth of the time. Tables are counted in, so the
-# rows that this is found out on are more than elsewhere.
-WORTH_THE_TIME, QUICK_BAND_TEXELS = 1.12, 1 << 18
+# Of a scene's pages; images of larger ones are not tried as PNG, which is as slow and was never smaller.
+TRIED_TEXELS = 1 << 23
 
 
 class CompressedStorage:
@@ -42,7 +40,7 @@ class CompressedStorage:
 
     def add_textures(self, document: gltf.GLTF2, images: Sequence[NamedImage]) -> None:
         texels = sum(image.pixels.shape[0] * image.pixels.shape[1] for image in images) // IMAGES_PER_PAGE
-        files = mapped(_quickest if texels > QUICK_FROM_TEXELS else _smallest, images)
+        files = mapped(lambda image: _encoded(image, texels), images)
         for image, (kind, data) in zip(images, files, strict=True):
             view = self.blob.append(data)
             document.images.append(gltf.Image(name=image.name, mimeType=f"image/{kind}", bufferView=view))
@@ -139,12 +137,14 @@ def decoded_exponential(rows: np.ndarray) -> np.ndarray:
     return np.ldexp(mantissa.astype(np.float32), exponent)
 
 
-def _smallest(image: NamedImage) -> tuple[str, bytes]:
+def _encoded(image: NamedImage, scene_texels: int) -> tuple[str, bytes]:
     """("webp" or "png", the file): what is smaller on the middle rows."""
 
     def webp(pixels: np.ndarray) -> bytes:
-        return encode_webp(pixels, exact=image.exact)
+        return encode_webp(pixels, exact=image.exact, scene_texels=scene_texels)
 
+    if scene_texels > TRIED_TEXELS:
+        return "webp", webp(image.pixels)
     band = middle_band(image.pixels)
     tried = [
         (len(data), kind, encode, data)
@@ -153,11 +153,3 @@ def _smallest(image: NamedImage) -> tuple[str, bytes]:
     ]
     _, kind, encode, data = min(tried, key=lambda each: each[0])
     return kind, data if len(band) == len(image.pixels) else encode(image.pixels)
-
-
-def _quickest(image: NamedImage) -> tuple[str, bytes]:
-    """("webp", the file): by the quicker encoder, unless that takes much more on the middle rows."""
-    band = middle_band(image.pixels, QUICK_BAND_TEXELS)
-    if len(encode_vp8l(band)) <= WORTH_THE_TIME * len(encode_webp(band, exact=image.exact, quick=True)):
-        return "webp", encode_vp8l(image.pixels)
-    return "webp", encode_webp(image.pixels, exact=image.exact, quick=True)

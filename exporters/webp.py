@@ -11,9 +11,13 @@ from exporters.invalid import invalid
 
 # Measured on lego at 400 px for the web, three images of 2048², one core: method 0 quality 0 takes 0.8 s for 15.8 MB,
 # 1 and 0 2.2 s for 13.7, 2 and 40 3.3 s for 13.0, 4 and 50 3.8 s for 12.9; 6 and 100 ten times as long for a percent.
-METHOD, EFFORT = 2, 40
-QUICK_METHOD, QUICK_EFFORT = 1, 0
-QUICK_FROM_TEXELS = 1 << 23  # of a scene; beyond it, pages take longer than people wait for some percent
+# Pages of large scenes take longer than people wait for some percent. On a page of benchmarks/big_scene.py, s and MB:
+# 2 and 40 14.1 s 44.9 MB; 3 and 0 7.2 s 45.8 MB; 1 and 0 6.6 s 46.0 MB; 0 and 0 3.5 s 53.3 MB.
+EFFORTS = (  # texels of a scene's pages, up to which; method and quality
+    (1 << 23, 2, 40),  # half of a page of 4096²
+    (1 << 25, 1, 0),  # two
+    (1 << 63, 0, 0),
+)
 
 _SIGNATURE = struct.Struct("<4sI4s4sIBI")  # RIFF, length, WEBP, VP8L, length, 0x2f, sizes
 _ONE_BYTE_MARK = 0x2F
@@ -25,17 +29,17 @@ def is_webp(data: bytes) -> bool:
     return data[:4] == b"RIFF" and data[8:12] == b"WEBP"
 
 
-def encode_webp(image: np.ndarray, *, exact: bool = True, quick: bool = False) -> bytes:
+def encode_webp(image: np.ndarray, *, exact: bool = True, scene_texels: int = 0) -> bytes:
     """A lossless WebP file of a uint8 [height, width, 4] image, straight alpha, no colour profile.
 
     Args:
         exact: every byte is kept. Without, colours under alpha 0 become what compresses best.
-        quick: 6 % larger, a third faster.
+        scene_texels: of all the scene's pages together: the more, the less effort goes into each (`EFFORTS`).
     """
     file = io.BytesIO()
-    method, effort = (QUICK_METHOD, QUICK_EFFORT) if quick else (METHOD, EFFORT)
+    method, quality = next(effort for most, *effort in EFFORTS if scene_texels <= most)
     pixels = Image.fromarray(np.ascontiguousarray(image))
-    pixels.save(file, "WEBP", lossless=True, exact=exact, method=method, quality=effort)
+    pixels.save(file, "WEBP", lossless=True, exact=exact, method=method, quality=quality)
     return file.getvalue()
 
 

@@ -12,14 +12,15 @@ from exporters.compaction.filling import filled
 from exporters.compaction.packing import packed
 from exporters.compaction.quads import CHANNELS, Patches, Quads, joined, quads_of
 from exporters.compaction.recoding import Recoding, recoding_of, widened
-from exporters.compaction.resolution import SizeOptions, Trade, shrunk, size_options
+from exporters.compaction.resampling import shrunk
+from exporters.compaction.resolution import LEADING, SizeOptions, Trade, best_sizes, picked, size_options
 from exporters.compaction.sharing import with_constant_axes_collapsed, with_equal_patches_shared, without_empty
 from exporters.compaction.surface import surface_points
-from exporters.threads import mapped
+from exporters.threads import mapped, products_on_one_thread
 
 T = TypeVar("T")
 SAMPLE_POINTS = 40_000
-SAMPLE_QUADS = 8_000
+SAMPLE_QUADS, SAMPLE_TEXELS = 8_000, 1 << 20
 SEARCH_STEPS = 14
 FINEST_STEP = 1e-4
 LEAST_BITS = 0.2  # of a channel
@@ -68,6 +69,11 @@ def compacted(scene: BakedScene, quality: Quality = WEB) -> BakedScene:
     Features are recoded and rounded (recoding.py), patches take the resolution that they need (resolution.py), and what
     `repacked` does is done. Features under holes are no longer zero, but for the first.
     """
+    with products_on_one_thread():
+        return _compacted(scene, quality)
+
+
+def _compacted(scene: BakedScene, quality: Quality) -> BakedScene:
     seen = surface_points(scene, SAMPLE_POINTS)
     if len(seen.features_u8) == 0:
         return repacked(scene)
@@ -142,7 +148,7 @@ class _Sample:
     """Some of the quads, to find out on."""
 
     def __init__(self, parts: list[Quads], recoding: Recoding, quality: Quality) -> None:
-        numbers = np.random.default_rng(0).permutation(sum(map(len, parts)))[:SAMPLE_QUADS]
+        numbers = _sampled(np.concatenate([quads.patches.areas[quads.patch] for quads in parts]))
         self._options: list[tuple[SizeOptions, np.ndarray]] = []
         squares, pairs, texels, covered, patches = np.zeros(FEATURE_CHANNELS), 0, 0, 0.0, 0
         mean, first = _mean_area(parts), 0
@@ -178,6 +184,12 @@ class _Sample:
         return Trade(float(slope), float(np.maximum(bits, LEAST_BITS).sum() + BITS_OF_HOLES))
 
 
+def _sampled(texels: np.ndarray) -> np.ndarray:
+    """Numbers of the quads to find out on, of the texels [Q] that each has: evenly spread."""
+    numbers = np.random.default_rng(0).permutation(len(texels))[:SAMPLE_QUADS]
+    return numbers[: max(1, int((np.cumsum(texels[numbers]) <= SAMPLE_TEXELS).sum()))]
+
+
 def _mean_area(parts: list[Quads]) -> float:
     """Of all quads; 1 where none has any, so that weights stay finite."""
     return float(np.concatenate([quads.world_areas() for quads in parts]).mean()) or 1.0
@@ -191,10 +203,15 @@ def _patch_weights(quads: Quads, mean_area: float) -> np.ndarray:
 
 
 def _reduced_in_turn(parts: list[Quads], recoding: Recoding, trade: Trade, quality: Quality) -> list[Quads]:
-    """`_reduced` of each, where anything is left; takes them from the list to keep little in memory."""
-    mean_area, found = _mean_area(parts), []
-    while parts:
-        found.append(_reduced(parts.pop(0), mean_area, recoding, trade, quality))
+    """`_reduced` of each, where anything is left; takes them from the list to keep little in memory.
+
+    Several pages at a time, although each takes every core: not all that is done to a page does.
+    """
+    mean_area, waiting = _mean_area(parts), dict(enumerate(parts))
+    parts.clear()
+    found = mapped(
+        lambda number: _reduced(waiting.pop(number), mean_area, recoding, trade, quality), range(len(waiting))
+    )
     return [quads for quads in found if quads is not None]
 
 
@@ -203,21 +220,18 @@ def _reduced(quads: Quads, mean_area: float, recoding: Recoding, trade: Trade, q
 
     None where none is.
     """
-    weight = _patch_weights(quads, mean_area)
+    weight, channels = _patch_weights(quads, mean_area), np.argsort(-recoding.deviation)[:LEADING].tolist()
 
     def reduced(some: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Patches of one size as (numbers [n], texels [n, h, w, 11]), of one new size each."""
         texels = quads.patches.content(some)
         y, opaque = recoding.coordinates(texels[..., :FEATURE_CHANNELS]), is_opaque(texels)
-        best, _ = size_options(y, opaque, quality.most, quality.hole_cost).best(weight[some], trade)
-        values = np.concatenate([y, texels[..., FEATURE_CHANNELS:].astype(np.float32)], -1)
+        best = best_sizes(y, opaque, quality.most, quality.hole_cost, weight[some], trade, channels)
         found = []
         for height, width in np.unique(best[best[:, 0] > 0], axis=0):
-            here = (best == (height, width)).all(1)
-            part = values[here], opaque[here]
-            if (height, width) != texels.shape[1:3]:
-                part = shrunk(*part, (height, width))
-            found.append((some[here], _bytes(*part, recoding, quality)))
+            here = np.flatnonzero((best == (height, width)).all(1))
+            resized = _resized(picked(texels, here), picked(y, here), (height, width), recoding, quality)
+            found.append((some[here], resized))
         return found
 
     parts = [part for group in mapped(reduced, quads.patches.groups()) for part in group]
@@ -232,18 +246,28 @@ def _reduced(quads: Quads, mean_area: float, recoding: Recoding, trade: Trade, q
     return Quads(left.corners, left.ends, left.triangles, new[left.patch], patches).in_order_of_patches()
 
 
-def _bytes(values: np.ndarray, opaque: np.ndarray, recoding: Recoding, quality: Quality) -> np.ndarray:
-    """uint8 [n, h, w, 11] of coordinates and colours [n, h, w, 11]; only channel 0 says where holes are."""
-    features = recoding.bytes_of(values[..., :FEATURE_CHANNELS])
-    colors = rounded_colors(values[..., FEATURE_CHANNELS:], quality.fallback_db)
-    texels = filled(np.concatenate([features, colors], -1), opaque)
-    texels[..., 0] = np.where(opaque, features[..., 0], 0)
-    return texels
+def _resized(
+    texels: np.ndarray, y: np.ndarray, size: tuple[int, int], recoding: Recoding, quality: Quality
+) -> np.ndarray:
+    """Texels [n, h, w, 11] whose coordinates are y, at a size, recoded; only channel 0 says where holes are."""
+    opaque, colors = is_opaque(texels), texels[..., FEATURE_CHANNELS:]
+    if size != opaque.shape[1:]:
+        both, opaque = shrunk(np.concatenate([y, colors.astype(np.float32)], -1), opaque, size)
+        y, colors = both[..., :FEATURE_CHANNELS], both[..., FEATURE_CHANNELS:]
+    result = np.empty((*opaque.shape, CHANNELS), np.uint8)
+    result[..., :FEATURE_CHANNELS] = recoding.bytes_of(y)
+    result[..., FEATURE_CHANNELS:] = rounded_colors(colors, quality.fallback_db)
+    cut = np.flatnonzero(~opaque.all((1, 2)))
+    result[cut] = filled(result[cut], opaque[cut])
+    result[cut, ..., 0] *= opaque[cut]
+    return result
 
 
 def rounded_colors(colors: np.ndarray, decibels: float) -> np.ndarray:
     """uint8, rounded to multiples of the step that gives this PSNR."""
     step = max(1, int(np.sqrt(12 * 10 ** (-decibels / 10)) * 255))
+    if colors.dtype == np.uint8:  # whole numbers: looked up, which takes a third of the time
+        return rounded_colors(np.arange(256.0), decibels).take(colors)
     rounded: np.ndarray = np.clip(np.rint(colors / step) * step, 0, 255 // step * step).astype(np.uint8)
     return rounded
 

@@ -4,24 +4,22 @@ import numpy as np
 
 from core.baked import Page
 from core.conventions import FEATURE_CHANNELS, MAX_PAGE_SIZE_PX
-from exporters.compaction.quads import CHANNELS, TEXEL, Patches, Quads
+from exporters.compaction.quads import Patches, Quads
+from exporters.compaction.windows import as_items, windows
+from exporters.threads import mapped
 
 # What a further page has to save: each costs a draw call and three textures.
 WORTH_A_PAGE = 1 << 19  # texels, 6 MB on the graphics processor
 MOST_SPLITS = 2
+COLOR_CHANNELS = 3
 
 
 def packed(quads: Quads) -> tuple[Page, ...]:
     """The quads on pages; each shows the same texels as before."""
     patches = quads.patches
     order = np.lexsort((-patches.sizes[:, 1], -patches.sizes[:, 0]))
-    pages = []
-    for size, numbers, places in _pages(patches.sizes, order, MOST_SPLITS):
-        slot = np.full(len(patches.sizes), -1)
-        slot[numbers] = np.arange(len(numbers))
-        here = slot[quads.patch] >= 0
-        pages.append(_page(quads.subset(here), patches, size, numbers, places, slot))
-    return tuple(pages)
+    layouts = _pages(patches.sizes, order, MOST_SPLITS)
+    return tuple(mapped(lambda layout: _page(quads, layout), layouts))
 
 
 Layout = tuple[tuple[int, int], np.ndarray, np.ndarray]  # page size (h, w); patch numbers; their (top, left)
@@ -90,24 +88,35 @@ def _run_length(sizes: np.ndarray, first: int) -> int:
     return int(different[0]) if len(different) else len(ahead)
 
 
-def _page(
-    quads: Quads, patches: Patches, size: tuple[int, int], numbers: np.ndarray, places: np.ndarray, slot: np.ndarray
-) -> Page:
-    image = np.zeros((*size, CHANNELS), np.uint8)
+def _page(quads: Quads, layout: Layout) -> Page:
+    """The page of those quads whose patches it holds."""
+    size, numbers, places = layout
+    patches = quads.patches
+    slot = np.full(len(patches.sizes), -1)
+    slot[numbers] = np.arange(len(numbers))
+    quads = quads.subset(slot[quads.patch] >= 0)
+    features, colors = _images(patches, layout, slot)
     sizes = patches.sizes[numbers]
-    for some in patches.groups(numbers):
-        texels, (top, left) = patches.content(some), places[slot[some]].T
-        rows = top[:, None, None] + np.arange(texels.shape[1])[:, None]
-        columns = left[:, None, None] + np.arange(texels.shape[2])
-        image.view(TEXEL)[rows, columns, 0] = np.ascontiguousarray(texels).view(TEXEL)[..., 0]
     mine = slot[quads.patch]
     corner = places[mine][:, None, ::-1] + quads.ends * (sizes[mine][:, None, ::-1] - 1)
     texcoords = (corner + 0.5) / (size[1], size[0])
     triangles = quads.triangles + 4 * np.arange(len(quads), dtype=np.uint32)[:, None, None]
     return Page(
-        np.ascontiguousarray(image[..., :FEATURE_CHANNELS]),
-        np.ascontiguousarray(image[..., FEATURE_CHANNELS:]),
+        features,
+        colors,
         quads.corners.reshape(-1, 3),
         texcoords.reshape(-1, 2).astype(np.float32),
         triangles.reshape(-1, 3),
     )
+
+
+def _images(patches: Patches, layout: Layout, slot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(features [h, w, 8], colours [h, w, 3]), uint8, of a page; `slot` [N]: a patch's place among the layout's."""
+    (height, width), numbers, places = layout
+    features, colors = (np.zeros((height, width, c), np.uint8) for c in (FEATURE_CHANNELS, COLOR_CHANNELS))
+    for some in patches.groups(numbers):
+        texels, (top, left) = patches.content(some), places[slot[some]].T
+        first = (top * width + left)[:, None] + width * np.arange(texels.shape[1])
+        for image, part in ((features, texels[..., :FEATURE_CHANNELS]), (colors, texels[..., FEATURE_CHANNELS:])):
+            windows(image.reshape(-1, image.shape[2]), texels.shape[2])[first] = as_items(part, 2)
+    return features, colors

@@ -1,6 +1,6 @@
 """A page taken apart into quads, each with a patch: the rectangle of texels that it shows.
 
-Patches of all sizes lie one after the other in one array; patch n is rows offsets[n] to offsets[n] + h * w.
+Patches of all sizes lie in one array; patch n is rows offsets[n] to offsets[n] + h * w.
 """
 
 from collections.abc import Iterator
@@ -11,13 +11,13 @@ import numpy as np
 
 from core.baked import Page
 from core.conventions import FEATURE_CHANNELS
+from exporters.compaction.windows import as_bytes, as_items, windows
 
 CHANNELS = FEATURE_CHANNELS + 3  # features, then the fallback's colour
 # How far, in texels, a corner may be from a texel's centre: float32 on 4096 texels gives 2e-4, other tools' decimals
 # 2e-3.
 OFF_CENTRE = 0.01
-TEXELS_AT_ONCE = 1 << 18  # 3 MB, or 10 MB of moments; with less, small steps of threads wait for each other
-TEXEL = np.dtype((np.void, CHANNELS))  # copied as a whole: several times faster than channel by channel
+TEXELS_AT_ONCE = 1 << 17  # 1.5 MB, or 5 MB of moments; with less, small steps take longer, and wait for each other
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,12 @@ class Patches:
     """Attributes:
     sizes: int64 [N, 2], (height, width) in texels.
     texels: uint8 [T, 11], row-major within a patch: eight features, then red, green, blue of the fallback.
+    starts: int64 [N], first row of each patch; None: they lie one after the other and make up all of `texels`.
     """
 
     sizes: np.ndarray
     texels: np.ndarray
+    starts: np.ndarray | None = None
 
     @property
     def areas(self) -> np.ndarray:
@@ -39,8 +41,14 @@ class Patches:
     @cached_property
     def offsets(self) -> np.ndarray:
         """[N] first row of each patch."""
+        if self.starts is not None:
+            return self.starts
         offsets: np.ndarray = np.cumsum(self.areas) - self.areas
         return offsets
+
+    def subset(self, numbers: np.ndarray) -> "Patches":
+        """Patches `numbers` [n] alone; nothing is copied."""
+        return Patches(self.sizes[numbers], self.texels, self.offsets[numbers])
 
     def groups(self, numbers: np.ndarray | None = None) -> Iterator[np.ndarray]:
         """Numbers [n] of patches of one size, about TEXELS_AT_ONCE texels at a time.
@@ -61,14 +69,12 @@ class Patches:
         if (np.diff(starts) == area).all():
             texels = self.texels[starts[0] : starts[0] + len(numbers) * area]
         else:
-            texels = self.texels.view(TEXEL)[starts[:, None] + np.arange(area), 0][..., None].view(np.uint8)
+            texels = as_bytes(windows(self.texels, area)[starts])
         return texels.reshape(len(numbers), height, width, CHANNELS)
 
     def place(self, numbers: np.ndarray, texels: np.ndarray) -> None:
         """Writes the texels [n, h, w, 11] of patches that have this size."""
-        area = texels.shape[1] * texels.shape[2]
-        to = self.offsets[numbers][:, None] + np.arange(area)
-        self.texels.view(TEXEL)[to, 0] = np.ascontiguousarray(texels).view(TEXEL).reshape(len(numbers), area)
+        windows(self.texels, texels.shape[1] * texels.shape[2])[self.offsets[numbers]] = as_items(texels, 1)
 
 
 def slices(count: int, at_once: int) -> Iterator[slice]:
@@ -138,14 +144,8 @@ def quads_of(page: Page) -> Quads | None:
     if not (upright and (_distinct_ends(ends, high - low + 1)).all()):
         return None
     local = np.argmax(pairs[:, :, None] == vertices[:, None, :], axis=2).astype(np.uint32)
-    sizes = (high - low + 1)[:, ::-1]
-    return Quads(
-        page.positions[vertices],
-        ends,
-        local.reshape(-1, 2, 3),
-        np.arange(len(pairs)),
-        Patches(sizes, _texels(page, low, sizes)),
-    )
+    patches = _patches(page, low, (high - low + 1)[:, ::-1])
+    return Quads(page.positions[vertices], ends, local.reshape(-1, 2, 3), np.arange(len(pairs)), patches)
 
 
 def _distinct_ends(ends: np.ndarray, size: np.ndarray) -> np.ndarray:
@@ -156,26 +156,22 @@ def _distinct_ends(ends: np.ndarray, size: np.ndarray) -> np.ndarray:
     return expected
 
 
-def _texels(page: Page, low: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """[T, 11] of the rectangles that start at columns and rows `low` [Q, 2]."""
-    areas = sizes.prod(1)
-    starts = np.cumsum(areas) - areas
-    texels = np.empty((int(areas.sum()), CHANNELS), np.uint8)
+def _patches(page: Page, low: np.ndarray, sizes: np.ndarray) -> Patches:
+    """The rectangles of `sizes` [Q, 2] (height, width) that start at columns and rows `low` [Q, 2]."""
+    patches = Patches(sizes, np.empty((int(sizes.prod(1).sum()), CHANNELS), np.uint8))
     page_width = page.features_u8.shape[1]
-    features, colors = (whole.reshape(-1, whole.shape[-1]) for whole in (page.features_u8, page.colors_u8))
     features, colors = (
-        np.ascontiguousarray(whole).view((np.void, whole.shape[1]))[:, 0] for whole in (features, colors)
+        np.ascontiguousarray(whole).reshape(-1, whole.shape[-1]) for whole in (page.features_u8, page.colors_u8)
     )
-    for height, width in np.unique(sizes, axis=0):
-        equal = np.flatnonzero((sizes == (height, width)).all(1))
-        inside = np.arange(height)[:, None] * page_width + np.arange(width)
-        for part in slices(len(equal), TEXELS_AT_ONCE // (height * width)):
-            some = equal[part]
-            at = (low[some, 1] * page_width + low[some, 0])[:, None] + inside.ravel()
-            to = starts[some][:, None] + np.arange(height * width)
-            texels[to, :FEATURE_CHANNELS] = features[at][..., None].view(np.uint8)
-            texels[to, FEATURE_CHANNELS:] = colors[at][..., None].view(np.uint8)
-    return texels
+    first = low[:, 1] * page_width + low[:, 0]
+    for some in patches.groups():
+        height, width = sizes[some[0]]
+        rows = first[some, None] + page_width * np.arange(height)
+        texels = np.empty((len(some) * height * width, CHANNELS), np.uint8)
+        texels[:, :FEATURE_CHANNELS] = as_bytes(windows(features, width)[rows]).reshape(-1, FEATURE_CHANNELS)
+        texels[:, FEATURE_CHANNELS:] = as_bytes(windows(colors, width)[rows]).reshape(len(texels), -1)
+        patches.place(some, texels.reshape(len(some), height, width, CHANNELS))
+    return patches
 
 
 def joined(parts: list[Quads]) -> Quads:

@@ -1,6 +1,6 @@
 """EXT_meshopt_compression, KHR_mesh_quantization and EXT_texture_webp: what browsers load, in the fewest bytes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import meshopt
@@ -15,13 +15,16 @@ from exporters.gltf.quantization import steps_of
 from exporters.gltf.storage import IMAGES_PER_PAGE, NamedImage, accessor, corners, index_types, primitive
 from exporters.png import encode_png, middle_band
 from exporters.threads import mapped
-from exporters.webp import QUICK_FROM_TEXELS, encode_webp
+from exporters.webp import encode_webp
 
 QUANTIZATION = "KHR_mesh_quantization"
 # A texture coordinate is (x + 1/2) / 4096 or a coarser one: 13 bits and a sign, exactly.
 TEXCOORD_BITS = 15
 # Of a float position's largest coordinate, where the scene is too wide for whole steps.
 POSITION_BITS = 18
+
+# Of a scene's pages; images of larger ones are not tried as PNG, which is as slow and was never smaller.
+TRIED_TEXELS = 1 << 23
 
 
 class CompressedStorage:
@@ -37,7 +40,7 @@ class CompressedStorage:
 
     def add_textures(self, document: gltf.GLTF2, images: Sequence[NamedImage]) -> None:
         texels = sum(image.pixels.shape[0] * image.pixels.shape[1] for image in images) // IMAGES_PER_PAGE
-        files = mapped(_coding(quick=texels > QUICK_FROM_TEXELS), images)
+        files = mapped(lambda image: _encoded(image, texels), images)
         for image, (kind, data) in zip(images, files, strict=True):
             view = self.blob.append(data)
             document.images.append(gltf.Image(name=image.name, mimeType=f"image/{kind}", bufferView=view))
@@ -134,17 +137,19 @@ def decoded_exponential(rows: np.ndarray) -> np.ndarray:
     return np.ldexp(mantissa.astype(np.float32), exponent)
 
 
-def _coding(*, quick: bool) -> Callable[[NamedImage], tuple[str, bytes]]:
-    """Makes of an image ("webp" or "png", the file): what is smaller on its middle rows."""
+def _encoded(image: NamedImage, scene_texels: int) -> tuple[str, bytes]:
+    """("webp" or "png", the file): what is smaller on the middle rows."""
 
-    def webp(image: NamedImage, pixels: np.ndarray) -> tuple[str, bytes]:
-        return "webp", encode_webp(pixels, exact=image.exact, quick=quick)
+    def webp(pixels: np.ndarray) -> bytes:
+        return encode_webp(pixels, exact=image.exact, scene_texels=scene_texels)
 
-    def smallest(image: NamedImage) -> tuple[str, bytes]:
-        band = middle_band(image.pixels)
-        best = min(webp(image, band), ("png", encode_png(band)), key=lambda file: len(file[1]))
-        if len(band) == len(image.pixels):
-            return best
-        return webp(image, image.pixels) if best[0] == "webp" else ("png", encode_png(image.pixels))
-
-    return smallest
+    if scene_texels > TRIED_TEXELS:
+        return "webp", webp(image.pixels)
+    band = middle_band(image.pixels)
+    tried = [
+        (len(data), kind, encode, data)
+        for kind, encode in (("webp", webp), ("png", encode_png))
+        for data in [encode(band)]
+    ]
+    _, kind, encode, data = min(tried, key=lambda each: each[0])
+    return kind, data if len(band) == len(image.pixels) else encode(image.pixels)

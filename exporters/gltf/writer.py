@@ -19,6 +19,7 @@ from exporters.gltf.quantization import quantised
 from exporters.gltf.storage import IMAGES_PER_PAGE, NamedImage, PlainStorage, Storage
 from exporters.limits import check_size
 from exporters.numbers import column_major
+from exporters.threads import mapped
 
 FILE_NAME = "scene.glb"
 WEB_NAME = "scene.web.glb"
@@ -125,9 +126,8 @@ def _empty_document() -> gltf.GLTF2:
 
 
 def _add_pages(document: gltf.GLTF2, scene: BakedScene, storage: Storage) -> None:
-    storage.add_textures(
-        document, [image for number, page in enumerate(scene.pages) for image in _page_images(page, f"page{number}")]
-    )
+    images = mapped(lambda numbered: _page_images(numbered[1], f"page{numbered[0]}"), enumerate(scene.pages))
+    storage.add_textures(document, [image for of_page in images for image in of_page])
     for number, page in enumerate(scene.pages):
         first = IMAGES_PER_PAGE * number
         document.materials.append(_fallback_material(number, first + 2))

@@ -49,8 +49,7 @@ def write_viewer_html(glb: bytes, *, title: str = "Scene", viewer: Path = VIEWER
     page, files = _page_and_files(read)
     found = modules_from(page.entry, page.import_map, lambda path: read(path).decode())
     modules = {path: with_paths_as_names(path, text, page.import_map) for path, text in found.items()}
-    text = page.with_all_within(glb, title, modules, files, read(LICENCE).decode())
-    return {HTML_NAME: text.encode()}
+    return {HTML_NAME: page.with_all_within(glb, title, modules, files, read(LICENCE).decode())}
 
 
 def write_viewer_zip(glb: bytes, *, title: str = "Scene", viewer: Path = VIEWER) -> dict[str, bytes]:

@@ -13,6 +13,7 @@ _STYLE = re.compile(r'<link rel="stylesheet" href="\./([^"]+)" />')
 _ICON = re.compile(r'<link rel="icon" href="\./([^"]+)"')
 _BACK = re.compile(r'\s*<a class="[^"]*" href="\./"[^>]*>.*?</a>', re.DOTALL)  # to the service's other pages
 _TITLE = re.compile(r"<title>.*?</title>", re.DOTALL)
+_SCENE = "<the scene>"  # stands for it; nothing else can hold it, since titles are escaped
 
 # Modules are unpacked and named to the browser before the first of them is asked for.
 _START = """
@@ -58,8 +59,8 @@ class ViewerPage:
 
     def with_all_within(
         self, glb: bytes, title: str, modules: Mapping[str, str], files: Mapping[str, bytes], licence: str
-    ) -> str:
-        """The page that needs no other file.
+    ) -> bytes:
+        """The page that needs no other file. The scene, which may have 200 MB, is copied once, when it is put in.
 
         Args:
             modules: by path, importing each other by paths.
@@ -69,7 +70,7 @@ class ViewerPage:
         packed = base64.b64encode(gzip.compress(json.dumps(modules).encode(), 9, mtime=0)).decode()
         scene = f'id="polyfield-scene" data-title="{html.escape(title)}"'
         body = [
-            f'<script type="text/plain" {scene}>{base64.b64encode(glb).decode()}</script>',
+            f'<script type="text/plain" {scene}>{_SCENE}</script>',
             f'<script type="text/plain" id="polyfield-modules">{packed}</script>',
             f"<script>{_START.replace('ENTRY', self.entry)}</script>",
         ]
@@ -78,7 +79,9 @@ class ViewerPage:
         icon = f"data:image/svg+xml;base64,{base64.b64encode(files[self.icon]).decode()}"
         text = _ICON.sub(lambda _: f'<link rel="icon" href="{icon}"', text)
         text = text.replace("</body>", "".join(f"    {part}\n" for part in body) + "  </body>")
-        return text.replace("<html", f"<!--\nIt contains three.js:\n\n{licence.strip()}\n-->\n<html", 1)
+        text = text.replace("<html", f"<!--\nIt contains three.js:\n\n{licence.strip()}\n-->\n<html", 1)
+        before, after = text.encode().split(_SCENE.encode())
+        return b"".join([before, base64.b64encode(glb), after])
 
     def _titled(self, title: str) -> str:
         return _TITLE.sub(lambda _: f"<title>{html.escape(title)}</title>", self._text)

@@ -114,6 +114,21 @@ def test_known_texels_are_never_filled(rng: np.random.Generator) -> None:
     np.testing.assert_array_equal(filled(texels, known)[3], texels[3])
 
 
+def test_holes_take_what_the_text_says(rng: np.random.Generator) -> None:
+    texels, known = rng.integers(0, 99, (60, 4, 5, 2), dtype=np.uint8), rng.random((60, 4, 5)) < 0.2
+    found = filled(texels, known)
+    for patch, there, result in zip(texels, known, found, strict=True):
+        if not there.any():
+            np.testing.assert_array_equal(result, patch)
+            continue
+        rows = np.flatnonzero(there.any(1))
+        for y in range(4):
+            row = rows[np.abs(rows - y).argmin()]
+            columns = np.flatnonzero(there[row])
+            for x in range(5):
+                np.testing.assert_array_equal(result[y, x], patch[row, columns[np.abs(columns - x).argmin()]])
+
+
 def test_nearest_known_is_nearest(rng: np.random.Generator) -> None:
     known = rng.random((50, 9)) < 0.3
     for row, nearest in zip(known, nearest_known(known), strict=True):

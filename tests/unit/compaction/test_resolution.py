@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from exporters.compaction.resolution import Trade, overlaps, shrunk, sides, size_options
+from exporters.compaction.resampling import overlaps, shrunk
+from exporters.compaction.resolution import Trade, best_sizes, sides, size_options
 
 STEPS = 4000  # of the oracle's lookups along an axis
 
@@ -107,3 +108,36 @@ def test_sizes_rise_in_proportion_to_the_largest(shape: tuple[int, int], most: f
     for height, width in sizes:
         off = abs(height / largest[0] - width / largest[1])
         assert min(height, width) == 1 or off <= 0.5
+
+
+def mixed_patches(rng: np.random.Generator, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Whole and cut, flat and busy ones."""
+    busy = rng.choice([0.0, 0.01, 0.1, 1.0], (60, 1, 1, 1))
+    y = (rng.normal(size=(60, 1, 1, 8)) + busy * rng.normal(size=(60, *size, 8))).astype(np.float32)
+    opaque = np.ones((60, *size), bool)
+    opaque[::3, : size[0] // 2] = False
+    opaque[1::3] = rng.random((20, *size)) < 0.9
+    return y, opaque
+
+
+@pytest.mark.parametrize("size", [(7, 7), (5, 9), (1, 6), (1, 1)])
+@pytest.mark.parametrize(("most", "hole_cost"), [(1.0, np.inf), (1.0, 0.3), (0.5, 0.3), (0.5, np.inf)])
+def test_few_channels_rule_out_only_what_all_of_them_would(
+    rng: np.random.Generator, size: tuple[int, int], most: float, hole_cost: float
+) -> None:
+    y, opaque = mixed_patches(rng, size)
+    weight, trade = rng.uniform(0.1, 3.0, len(y)), Trade(2e-5, 20.0)
+    options = size_options(y, opaque, most, hole_cost)
+    found = best_sizes(y, opaque, most, hole_cost, weight, trade)
+    np.testing.assert_array_equal(found, options.best(weight, trade)[0])
+
+
+@pytest.mark.parametrize("size", [(7, 7), (5, 9), (1, 6)])
+def test_whole_patches_cost_what_patches_with_holes_would(rng: np.random.Generator, size: tuple[int, int]) -> None:
+    y, opaque = mixed_patches(rng, size)
+    whole = np.concatenate([opaque[2::3], opaque[:1]])  # the last one has holes, so that all are taken for cut
+    y = np.concatenate([y[2::3], y[:1]])
+    cut, alone = (size_options(y[:n], whole[:n], 1.0, 0.3) for n in (len(y), len(y) - 1))
+    # float32 sums of squares about 1, over some 60 texels
+    np.testing.assert_allclose(alone.errors, cut.errors[:, :-1], atol=1e-4, rtol=1e-4)
+    np.testing.assert_array_equal(alone.texels, cut.texels[:, :-1])

@@ -10,8 +10,8 @@ from core.conventions import is_opaque
 from exporters.check import check_glb
 from exporters.compaction import PHONE, WEB, compacted
 from exporters.glsl import VERSIONS, shader_sources
-from exporters.gltf import read_glb, read_shaders, write_glb, write_lq_glb, write_web_glb
-from exporters.gltf.compressed import in_order_of_use
+from exporters.gltf import compressed, read_glb, read_shaders, write_glb, write_lq_glb, write_web_glb
+from exporters.gltf.compressed import TRIED_TEXELS, in_order_of_use
 from exporters.gltf.quantization import LARGEST, quantised, steps_of
 from tests.scenes import random_scene
 from tests.unit.compaction.lookups import Lookups, random_points
@@ -31,7 +31,11 @@ def wide(scene: BakedScene) -> BakedScene:
 
 
 @pytest.mark.parametrize("kind", WRITERS)
-def test_what_is_read_is_the_compacted_scene(scene: BakedScene, kind: str) -> None:
+@pytest.mark.parametrize("tried", [TRIED_TEXELS, 0], ids=["small", "large"])
+def test_what_is_read_is_the_compacted_scene(
+    scene: BakedScene, kind: str, tried: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compressed, "TRIED_TEXELS", tried)
     write, quality = WRITERS[kind]
     ((name, glb),) = write(scene).items()
     held, expected = read_glb(glb), quantised(compacted(scene, quality))

@@ -21,14 +21,14 @@ from core.field.network import new_network
 from core.field.region import Region, find_region
 from core.presets import Settings
 from core.progress import Progress, ProgressCallback, ignore_progress
+from core.stage_times import stage_seconds
 from core.training.field_stage import FieldStage
 from core.training.pixels import PixelPool
 from core.training.stage import Stage
 from core.training.texel_stage import TexelStage
 from core.training.voxel_stage import VoxelStage
 
-# The stages' shares of the time, for the progress bar; measured on two cores, between draft and balanced.
-STAGE_SHARES = {"voxels": 0.20, "field": 0.22, "texels": 0.52, "bake": 0.06}
+BAKE_SHARE = 0.06  # of the time, for the progress bar
 REPORT_INTERVAL_S = 0.5
 # To be raised when a stage keeps other things: checkpoints of another format are ignored, not misread.
 CHECKPOINT_FORMAT = 5
@@ -162,9 +162,10 @@ class _Run:
         self._tell(stage.name, stage.fraction, stage.psnr, preview)
 
     def _tell(self, name: str, share: float, psnr: float | None, preview: Any = None) -> None:
-        names = list(STAGE_SHARES)
-        before = sum(STAGE_SHARES[earlier] for earlier in names[: names.index(name)])
-        self._progress(Progress(name, min(before + STAGE_SHARES[name] * share, 1.0), psnr, preview))
+        shares = stage_shares(self.settings)
+        names = list(shares)
+        before = sum(shares[earlier] for earlier in names[: names.index(name)])
+        self._progress(Progress(name, min(before + shares[name] * share, 1.0), psnr, preview))
 
     def _preview(self, stage: Stage) -> Any:
         camera = (self.capture.test or self.capture.train)[0].camera
@@ -175,6 +176,13 @@ class _Run:
         if isinstance(stage, VoxelStage):
             return preview_of_field(stage.field, self.network, camera, self.region.frame, background, self.device)
         return None
+
+
+def stage_shares(settings: Settings) -> dict[str, float]:
+    """The stages' shares of the time, in order; their sum is 1."""
+    seconds = stage_seconds(settings)
+    whole = sum(seconds.values()) / (1.0 - BAKE_SHARE)
+    return {**{name: of_stage / whole for name, of_stage in seconds.items()}, "bake": BAKE_SHARE}
 
 
 def _identity(capture: Capture, settings: Settings, seed: int) -> dict[str, Any]:

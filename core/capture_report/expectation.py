@@ -1,7 +1,6 @@
 """What training will take, roughly: a person wants to know whether to wait or to come back tomorrow.
 
-The constants are fits by eye to the conversions in benchmarks/results (lego at 100 and 400 px, the sample, fern, fox;
-two cores of an AMD EPYC). They hold within a factor of two: scenes differ in how much surface they have.
+The constants are fits by eye to the conversions in benchmarks/results, like those of core/stage_times.py.
 """
 
 from __future__ import annotations
@@ -10,9 +9,8 @@ import os
 from dataclasses import dataclass
 
 from core.presets import Settings
+from core.stage_times import stage_seconds
 
-# Seconds per ray on two cores, and per node or cell of an axis: finer grids are met more often.
-VOXEL_RAY_S, FIELD_RAY_S, TEXEL_RAY_S = 2.3e-8, 1.05e-7, 1.6e-7
 SURROUNDINGS = 1.5  # times as long where a scene has some: every ray meets something, often in fog
 PIXEL_S = 1.9e-6  # of baking and measuring, per pixel of all photos
 START_S = 6.0
@@ -56,11 +54,6 @@ def expected(
     glb_bytes = quads * (TEXEL_BYTES * settings.patch**2 + QUAD_BYTES)
     if device != "cpu":
         return Expectation(None, glb_bytes)
-    rays = (
-        settings.voxel_steps * settings.voxel_batch * settings.nodes * VOXEL_RAY_S
-        + settings.field_steps * settings.field_batch * settings.cells * FIELD_RAY_S
-        + settings.texel_steps * settings.texel_batch * settings.cells * TEXEL_RAY_S
-    )
-    rays *= SURROUNDINGS if surroundings else 1.0
+    rays = sum(stage_seconds(settings).values()) * (SURROUNDINGS if surroundings else 1.0)
     cores = cores or os.cpu_count() or MEASURED_CORES
     return Expectation((START_S + rays + photo_pixels * PIXEL_S) * MEASURED_CORES / cores, glb_bytes)

@@ -16,9 +16,9 @@ from core.capture import Capture
 from core.checkpoint import FILE_NAME, CheckpointFile
 from core.errors import CheckpointInvalid, OptionInvalid, TrainingFailed
 from core.evaluation import evaluate
-from core.presets import Settings, settings_for
+from core.presets import PRESETS, Settings, settings_for
 from core.progress import Progress
-from core.reconstruct import STAGE_SHARES, Reconstruction, reconstruct
+from core.reconstruct import Reconstruction, reconstruct, stage_shares
 from core.training import field_stage
 from core.training.tracer import Tracer
 from core.training.voxel_stage import VoxelStage
@@ -111,7 +111,7 @@ def test_progress_goes_through_the_stages_never_falls_and_ends_at_one(undisturbe
 
 
 def test_every_stage_tells_its_seconds(undisturbed):
-    assert set(STAGE_SHARES) <= set(undisturbed.seconds)
+    assert set(stage_shares(SETTINGS)) <= set(undisturbed.seconds)
     assert all(seconds > 0 for seconds in undisturbed.seconds.values())
 
 
@@ -145,8 +145,19 @@ def watched(capture: Capture, tmp_path_factory: pytest.TempPathFactory) -> Watch
 
 
 def fraction_at(stage: str, share: float) -> float:
-    names = list(STAGE_SHARES)
-    return sum(STAGE_SHARES[name] for name in names[: names.index(stage)]) + share * STAGE_SHARES[stage] - 1e-9
+    shares = stage_shares(SETTINGS)
+    names = list(shares)
+    return sum(shares[name] for name in names[: names.index(stage)]) + share * shares[stage] - 1e-9
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_stages_share_all_of_the_time_by_what_they_have_to_do(preset):
+    shares = stage_shares(PRESETS[preset])
+    assert list(shares) == [*TRAINING_STAGES, "bake"]
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert all(share > 0 for share in shares.values())
+    longer = stage_shares(replace(PRESETS[preset], field_steps=2 * PRESETS[preset].field_steps))
+    assert longer["field"] > shares["field"]
 
 
 def test_the_same_seed_gives_the_same_bytes_whatever_is_reported_and_kept(undisturbed, watched):

@@ -11,10 +11,13 @@ class BatchSequence:
     """Batches of one size from one pool, in turn. They are those that the pool draws: only the time differs.
 
     What a batch depends on in the pool (`log_gains`) must not change while the sequence is in use.
+
+    Attributes:
+        count: pixels of a batch.
     """
 
     def __init__(self, pool: PixelPool, count: int, *, supersampled: bool) -> None:
-        self._pool, self._count, self._supersampled = pool, count, supersampled
+        self.count, self._pool, self._supersampled = count, pool, supersampled
         self._ahead: tuple[int, Future[Batch]] | None = None
 
     def draw(self, number: int) -> Batch:
@@ -31,4 +34,4 @@ class BatchSequence:
         return self._ahead[1].result()
 
     def _draw(self, number: int) -> Batch:
-        return self._pool.draw(number, self._count, supersampled=self._supersampled)
+        return self._pool.draw(number, self.count, supersampled=self._supersampled)

@@ -95,15 +95,15 @@ class VoxelStage(Stage):
         self._late_distortion = OPEN_LATE_DISTORTION if is_open else 1.0
         self._smoothness = OPEN_SMOOTHNESS if is_open else 0.0
         self._levels = levels_of(settings)
-        self._enter(VoxelField.new(region.space, self._levels[0].nodes, region.hull, seed, device), self._levels[0])
+        self._enter(VoxelField.new(region.space, self._levels[0].nodes, region.hull, seed, device))
 
-    def _enter(self, field: VoxelField, level: Level) -> None:
+    def _enter(self, field: VoxelField) -> None:
         self.field, self.marcher = field, Marcher(field, self.device)
         largest = max(max(view.camera.size_px) for view in self.capture.train)
         factor = min(round(largest / (PIXELS_PER_NODE * field.nodes)), largest // SMALLEST_IMAGE_PX)
         self._pool = PixelPool(self.capture.train, self.region.frame, self.device, max(1, factor), self.seed)
         self._pool.log_gains = self.log_gains
-        self._batches = BatchSequence(self._pool, level.batch, supersampled=False)
+        self._batches: BatchSequence | None = None
         self._steps_here = 0
 
     def _level(self) -> Level:
@@ -116,12 +116,12 @@ class VoxelStage(Stage):
                 self._even_exposure()
             with torch_threads(THREADS):  # no kernel runs meanwhile
                 finer = self.field.upsampled(level.nodes)
-            self._enter(finer, level)
+            self._enter(finer)
             self._update_occupancy(level)
         elif self._steps_here and self._steps_here % OCCUPANCY_INTERVAL == 0:
             self._update_occupancy(level)
         self._steps_here += 1
-        batch = self._batches.draw(self._steps_here)
+        batch = self._batches_of(level).draw(self._steps_here)
         rng = np.random.default_rng([self.seed, 2, self.done])
         jitter = torch.from_numpy(rng.random(level.batch, dtype=np.float32)).to(self.device)
         F, A = self.marcher.forward(batch.origins, batch.directions, jitter)
@@ -139,6 +139,12 @@ class VoxelStage(Stage):
         decay = DENSITY_DECAY * (1.0 - self.fraction)
         self.marcher.adam(rates, decay, (EMPTY_DENSITY, HIGHEST_DENSITY), BETA2, self._steps_here)
         return color_error(color, A, batch.color, batch.alpha)
+
+    def _batches_of(self, level: Level) -> BatchSequence:
+        """Levels of the same nodes have one pool, and may have batches of their own sizes."""
+        if self._batches is None or self._batches.count != level.batch:
+            self._batches = BatchSequence(self._pool, level.batch, supersampled=False)
+        return self._batches
 
     def _distortion_weight(self) -> float:
         if self._level() is self._levels[0]:
@@ -184,5 +190,5 @@ class VoxelStage(Stage):
         field.parameters = field.parameters.training(state["trained"].to(self.device))
         field.parameters.restore_rows(state["rows"])
         self.log_gains = None if state["log_gains"] is None else state["log_gains"].to(self.device)
-        self._enter(field, self._level())
+        self._enter(field)
         self._steps_here = state["steps_here"]

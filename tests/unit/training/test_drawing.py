@@ -5,7 +5,7 @@ from dataclasses import fields
 import pytest
 import torch
 
-from core.training.drawing import BatchSequence
+from core.training.drawing import _THREAD, BatchSequence
 from core.training.pixels import Batch, PixelPool
 from tests.unit.training.test_pixels import FRAME, marked_views
 
@@ -28,6 +28,6 @@ def test_what_fails_ahead_fails_where_it_is_drawn(rng, monkeypatch):
     sequence = BatchSequence(pool, 60, supersampled=False)
     sequence.draw(0)
     monkeypatch.setattr(pool, "draw", None)
-    sequence.draw(1)
+    sequence._ahead = 1, _THREAD.submit(sequence._draw, 1)
     with pytest.raises(TypeError):
-        sequence.draw(2)
+        sequence.draw(1)

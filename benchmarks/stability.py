@@ -18,7 +18,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -197,9 +197,11 @@ def determinism(lab: Lab) -> Iterator[Check]:
 
 
 def seeds(lab: Lab) -> Iterator[Check]:
-    """Different seeds give the same quality."""
+    """Different seeds give the same quality: of a published capture, with the draft preset as it is."""
     capture = lab.lego or lab.sample
-    found = [lab.convert(capture, seed=seed) for seed in range(SEEDS)]
+    # The small settings end where training still climbs: lego_100 then has 27.50 to 27.80 dB.
+    trainer = replace(lab, settings={}) if lab.lego else lab
+    found = [trainer.convert(capture, seed=seed) for seed in range(SEEDS)]
     values = [outcome.psnr for outcome in found if outcome.psnr is not None]
     spread = max(values) - min(values) if len(values) == SEEDS else float("inf")
     words = ", ".join(str(outcome) for outcome in found)

@@ -43,7 +43,8 @@ CLEAR_ERRORS = ("training-failed", "capture-empty")  # that a hopeless training 
 HEADING = """# Stability
 
 Made by `python -m benchmarks.stability`: the sample capture (40 photos of 100 px, unless said otherwise) with small
-settings, made difficult in one way a row. PSNR is of the written .glb, read again, on the held-out photos.
+settings, made difficult in one way a row; seeds of lego with the draft preset. PSNR is of the written .glb, read again,
+on the held-out photos.
 """
 COLUMNS = ("case", "variant", "promised", "found", "kept")
 

@@ -16,9 +16,8 @@ import numpy as np
 
 from exporters.compaction.resampling import Size, cells, integrals, with_patches_last
 
-LEADING = (
-    2  # channels that are looked at first; with 1, 8 % of lego_100's patches have to be looked at again, with 2, 5 %
-)
+# Channels that are looked at first. With 1, 8 % of lego_100's patches have to be looked at again, with 2, 5 %.
+LEADING = 2
 BITS_A_QUAD = 110.0  # four vertices and two triangles, compressed; measured
 
 

@@ -31,7 +31,7 @@ from core.training.voxel_stage import VoxelStage
 BAKE_SHARE = 0.06  # of the time, for the progress bar
 REPORT_INTERVAL_S = 0.5
 # To be raised when a stage keeps other things: checkpoints of another format are ignored, not misread.
-CHECKPOINT_FORMAT = 5
+CHECKPOINT_FORMAT = 6
 PREVIEW_INTERVAL_S = 20.0
 MAX_SEED = 2**31 - 1
 

@@ -125,12 +125,39 @@ def build_mesh(
     Raises:
         TrainingFailed: no quad is left.
     """
-    cells, space = solid.shape[0], space or Space.cube()
-    solid = solid.copy()
-    for axis in range(3):  # a vertex on the cube's rim would have quads that leave it
-        np.moveaxis(solid, axis, 0)[[0, -1]] = False
-    index = np.arange(cells**3).reshape(solid.shape)
-    corners = np.concatenate([_quads_across(solid, index, axis) for axis in range(3)])
+    return mesh_of(quads_between(solid), centroid.reshape(-1, 3), solid.shape[0], device, space, shells)
+
+
+def quads_between(solid: np.ndarray) -> np.ndarray:
+    """[n, 4] flat indices of the four cells around each grid edge, where all four are solid [P, P, P] (bool)."""
+    index = np.arange(solid.size).reshape(solid.shape)
+    return np.concatenate([_quads_across(solid, index, axis) for axis in range(3)])
+
+
+def mesh_of(
+    corners: np.ndarray,
+    places: np.ndarray,
+    cells: int,
+    device: str,
+    space: Space | None = None,
+    shells: np.ndarray | None = None,
+) -> QuadMesh:
+    """The mesh of some of the grid's quads, and the shells' seen ones.
+
+    Args:
+        corners: [n, 4] flat indices of the cells whose vertices are the corners of each quad.
+        places: [P^3, 3], where in the cells' cube each cell's vertex starts; its centre where not finite.
+        cells: P.
+        shells: as for `build_mesh`.
+
+    Raises:
+        TrainingFailed: no quad is left.
+    """
+    space = space or Space.cube()
+    corners = np.unique(corners.reshape(-1, CORNERS), axis=0)
+    # A vertex on the cube's rim would have quads that leave it.
+    within = np.stack(np.unravel_index(corners, (cells,) * 3), -1)
+    corners = corners[((within > 0) & (within < cells - 1)).all((1, 2))]
     shell_vertices, shell_quads, shell_cells = _shell_quads(space, cells, shells)
     if len(corners) + len(shell_quads) == 0:
         raise TrainingFailed(
@@ -144,7 +171,7 @@ def build_mesh(
     of_shells = np.concatenate([np.full(len(corners), -1), shell_cells]) if len(shell_cells) else np.zeros(0, np.int64)
     mesh = QuadMesh(cells, kept, torch.empty(0), quads, space, of_shells)
     centres = mesh.centres()
-    seen = centroid.reshape(-1, 3)[kept]
+    seen = places[kept]
     reach = VERTEX_REACH * mesh.cell_size
     moved = np.clip(np.where(np.isfinite(seen), seen - centres, 0.0), -reach, reach)
     vertices = np.concatenate([space.cells_to_scene(centres + moved), shell_vertices])

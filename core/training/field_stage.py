@@ -1,7 +1,8 @@
 """Stages 1b and 2: the mesh, with opacity and features from a volume; continuous and binary models together.
 
-The mesh starts where the voxel field is seen. Rays meet it, not the volume between; its vertices, the volume and the
-network train on both models' errors (eq. 14), the binary one's share growing. In the end, quads that no ray sees go.
+The mesh starts as the voxel field's surface (surfacing.py). Rays meet it, not the volume between; its vertices, the
+volume and the network train on both models' errors (eq. 14), the binary one's share growing. In the end, quads that no
+ray sees go.
 """
 
 from typing import Any
@@ -10,38 +11,34 @@ import torch
 import warp as wp
 from torch import Tensor, nn
 
-from core.field.bricks import places_in, to_bricks
+from core.field.bricks import places_in
 from core.field.frame import as_vec3, empty
 from core.field.network import shade
 from core.field.parameters import Parameters
-from core.field.space import CUBE, SHELLS, Space
-from core.field.voxels import DENSITY_SCALE, VoxelField
-from core.kernels.adam import adam_vertices, bias_correction
-from core.kernels.launch import accumulator_parts, launch
+from core.field.space import Space
+from core.kernels.launch import launch
 from core.kernels.surfaces import VOLUME_KERNELS, Volume, VolumeGradients, sample_volume
 from core.kernels.types import vec8
-from core.mesh.quad_mesh import FACES, VERTEX_REACH, QuadMesh, build_mesh, shells_around
+from core.mesh.quad_mesh import QuadMesh
 from core.presets import Settings
 from core.training.drawing import BatchSequence
 from core.training.loss import color_error, pixel_loss
-from core.training.marcher import Marcher, step_grid
+from core.training.marcher import step_grid
 from core.training.pixels import PixelPool
 from core.training.stage import Stage
-from core.training.survey import Survey
+from core.training.surfacing import HIT_CAPACITY, surfaced
 from core.training.tracer import Tracer
+from core.training.vertices import MovingVertices
 from core.training.voxel_stage import VoxelStage
 
 FEATURE_RATE, ALPHA_RATE, NETWORK_RATE = 0.01, 0.02, 2e-3
-VERTEX_RATE = 0.02  # in cells
-VERTEX_PULL = 1e-4
+# In cells. Vertices start on the surface, and faster ones leave it again: still_lambert, 600 steps, four sub-rays:
+# 26.5 dB at 0.02, 27.0 at 0.008, 26.8 at 0.003, 26.4 at 0.001. A pull to their cells' centres (eq. 6) changes nothing.
+VERTEX_RATE, VERTEX_PULL = 0.006, 0.0
 # A node or vertex is touched once in a dozen steps: with a short memory its last few gradients alone say how large its
 # steps are. lego_400, 600 steps, baked: 28.94 dB at 0.95, 29.27 at 0.99, 29.46 at 0.997, 29.48 at 0.999.
 BETA2 = 0.997
 FINAL_RATE = 0.1
-HIT_CAPACITY = 24
-SURVEY_RAYS, SURVEY_BATCH = 400_000, 8192
-SOLID_WEIGHT = 0.002  # 0.01 leaves out thin parts (-0.3 dB on lego_400), 0.1 leaves holes (-3 dB)
-OPEN_SOLID_WEIGHT = 0.01  # without alpha there is haze: at 0.002 fox began with 570,000 quads, and lost 2 dB
 SEEN_WEIGHT = 0.03
 BINARY_SHARE = (0.1, 0.6)  # of the loss, from the first step to the last; (0.2, 0.8) 0.07 dB less, (0.4, 0.9) 0.26
 PRUNING_STARTS = 0.75
@@ -70,23 +67,15 @@ class FieldStage(Stage):
         self._tracer = Tracer(mesh, VOLUME_KERNELS, settings.field_batch, 1, HIT_CAPACITY)
         self._volume = volume_of(mesh.space, nodes, parameters)
         self._touched = torch.zeros(len(parameters.trained), dtype=torch.uint8, device=device)
-        parts = accumulator_parts(device)
-        self._vertex_grad = torch.zeros(parts, *mesh.vertices.shape, device=device)
-        self._vertex_moments = (torch.zeros_like(mesh.vertices), torch.zeros_like(mesh.vertices))
-        self._kernel_space = mesh.space.kernel_space()
-        self._centres = torch.from_numpy(mesh.centres()).to(device)
+        self._vertices = MovingVertices(mesh, BETA2)
         self._gradients = self._kernel_gradients()
 
     @classmethod
     def after(cls, voxels: VoxelStage, pool: PixelPool) -> "FieldStage":
         """The stage that follows a finished voxel stage."""
         settings, device = voxels.settings, voxels.device
-        mesh = _surveyed_mesh(voxels.field, pool, settings.cells, device)
-        density = voxels.field.parameters.scalar.clamp_min(0.0)
-        # A quad stands for the matter within about a cell of it.
-        alpha = 1.0 - torch.exp(-density * (DENSITY_SCALE * mesh.cell_size * mesh.space.inner))
-        backdrop = to_bricks(torch.from_numpy(mesh.space.backdrop(voxels.field.nodes)))
-        alpha[backdrop.to(device)] = 1.0
+        cameras = [view.camera for view in voxels.capture.train]
+        mesh, alpha = surfaced(voxels.field, pool, voxels.region.frame, cameras, settings.cells, device)
         learned = voxels.field.parameters
         parameters = Parameters.starting_from(alpha, learned.features, learned.trained)
         return cls(pool, mesh, voxels.field.nodes, parameters, voxels.network, settings, voxels.seed, device)
@@ -133,20 +122,11 @@ class FieldStage(Stage):
         rates = (ALPHA_RATE * falling, FEATURE_RATE * falling)
         step_grid(self.parameters, self._touched, rates, 0.0, (0.0, 1.0), BETA2,
                   self.done + 1, self.device)  # fmt: skip
-        self._step_vertices(VERTEX_RATE * self.mesh.cell_size * falling)
+        self._vertices.step(VERTEX_RATE * falling, VERTEX_PULL, self.done + 1)
+        self._tracer.vertices_moved()
         if self.fraction >= PRUNING_STARTS or self.done + 1 == self.steps:
             self.seen[self._tracer.seen_quads(SEEN_WEIGHT)] = True
         return color_error(color_binary, A_binary, batch.color, batch.alpha)
-
-    def _step_vertices(self, rate: float) -> None:
-        reach = VERTEX_REACH * self.mesh.cell_size
-        state = [self.mesh.vertices, *self._vertex_moments, self._centres]
-        value, m1, m2, centres = (as_vec3(tensor) for tensor in state)
-        grad = as_vec3(self._vertex_grad)
-        inputs = [self._kernel_space, value, grad, m1, m2, centres, reach, rate, VERTEX_PULL,
-                  BETA2, bias_correction(self.done + 1, BETA2)]  # fmt: skip
-        launch(adam_vertices, len(self.mesh.kept), inputs, self.device)
-        self._tracer.vertices_moved()
 
     def _kernel_gradients(self) -> VolumeGradients:
         gradients = VolumeGradients()
@@ -154,7 +134,7 @@ class FieldStage(Stage):
         gradients.row_of = wp.from_torch(self.parameters.row_of)
         gradients.alpha, gradients.features = wp.from_torch(alpha), wp.from_torch(features, dtype=vec8)
         gradients.touched = wp.from_torch(self._touched)
-        gradients.vertices = as_vec3(self._vertex_grad)
+        gradients.vertices = self._vertices.gradients
         return gradients
 
     def own_state(self) -> dict[str, Any]:
@@ -166,13 +146,12 @@ class FieldStage(Stage):
             "quads": torch.from_numpy(self.mesh.quads),
             "shell_cells": torch.from_numpy(self.mesh.shell_cells),
             "vertices": self.mesh.vertices,
-            "vertex_moments": self._vertex_moments,
+            "vertex_moments": self._vertices.moments,
             "seen": self.seen,
         }
 
     def restore_own(self, state: dict[str, Any]) -> None:
-        for mine, saved in zip(self._vertex_moments, state["vertex_moments"], strict=True):
-            mine.copy_(saved)
+        self._vertices.restore(state["vertex_moments"])
         self.seen = state["seen"].to(self.device)
 
 
@@ -192,20 +171,3 @@ def sampled(volume: Volume, points: Tensor, device: str) -> tuple[Tensor, Tensor
     outputs = [wp.from_torch(alpha), wp.from_torch(features, dtype=vec8)]
     launch(sample_volume, len(points), [volume, as_vec3(points), *outputs], device)
     return alpha, features
-
-
-def _surveyed_mesh(field: VoxelField, pool: PixelPool, cells: int, device: str) -> QuadMesh:
-    """The mesh around what training rays see of the voxel field."""
-    shells = shells_around(field.space, cells)
-    survey = Survey.empty(cells, shells if field.space.kind == SHELLS else -1, device)
-    marcher = Marcher(field, device)
-    jitter = torch.full((SURVEY_BATCH,), 0.5, device=device)
-    for number in range(SURVEY_RAYS // SURVEY_BATCH):
-        batch = pool.draw(number, SURVEY_BATCH, supersampled=False)
-        marcher.forward(batch.origins, batch.directions, jitter)
-        marcher.survey(batch.origins, batch.directions, survey)
-    shape = (cells,) * 3
-    least = SOLID_WEIGHT if field.space.kind == CUBE else OPEN_SOLID_WEIGHT
-    solid = (survey.peak.amax(0) > least).cpu().numpy().reshape(shape)
-    seen = (survey.shell_peak.amax(0) > least).cpu().numpy().reshape(-1, FACES, cells, cells)
-    return build_mesh(solid, survey.centroids().reshape(*shape, 3), device, field.space, seen)

@@ -28,15 +28,19 @@ from core.training.field_stage import FieldStage, sampled, volume_of
 from core.training.loss import color_error, pixel_loss
 from core.training.pixels import PixelPool
 from core.training.stage import Stage
+from core.training.surfacing import HIT_CAPACITY
 from core.training.tracer import Tracer
+from core.training.vertices import MovingVertices
 
 FEATURE_RATE, ALPHA_RATE, NETWORK_RATE = 0.01, 0.015, 2e-3
 FINAL_RATE = 0.1
 CONTINUOUS_UNTIL, OPACITY_UNTIL = 0.4, 0.75  # of the steps
 LEAST_BINARY_SHARE = 0.3
 SMOOTHNESS = 0.01  # docs/training.md
+# Vertices move where silhouettes say so (core/kernels/silhouettes.py): rate in cells, and how far apart in depth two
+# surfaces are, in cells. docs/training.md.
+VERTEX_RATE, VERTEX_BETA2, GAP = 0.01, 0.997, 0.5
 SUBRAYS = 4
-HIT_CAPACITY = 24
 QUADS_AT_ONCE = 20_000
 Lists = list[tuple[int, list[Any]]]  # (length, inputs of kernels that go through it) of each part's touched texels
 
@@ -66,6 +70,7 @@ class TexelStage(Stage):
         self._texels.features = wp.from_torch(parameters.features, dtype=vec8)
         n, parts = len(parameters.scalar), parameters.parts
         capacity = min(n, settings.texel_batch * SUBRAYS * HIT_CAPACITY)
+        self._vertices = MovingVertices(mesh, VERTEX_BETA2)
         self._updates = torch.zeros(n, dtype=torch.int32, device=device)
         self._stamp = torch.full((parts, n), -1, dtype=torch.int32, device=device)
         self._touched = torch.empty(parts, capacity, dtype=torch.int32, device=device)
@@ -125,6 +130,9 @@ class TexelStage(Stage):
         soft, hard = (tuple(self.gradient(x, len(A)) for x in pair) for pair in ((F, A), (F_binary, A_binary)))
         gradients = self._kernel_gradients(with_alpha)
         self._tracer.backward(batch, self._texels, soft, hard, gradients, self.parameters.parts)
+        self._tracer.silhouettes(batch, hard, GAP * self.mesh.cell_size, self._vertices.parts, self._vertices.gradients)
+        self._vertices.step(VERTEX_RATE * falling, 0.0, self.done + 1)
+        self._tracer.vertices_moved()
         lists = self._lists()
         self._smooth(lists)
         self._adam(lists, ALPHA_RATE * falling if with_alpha else 0.0, FEATURE_RATE * falling)
@@ -165,10 +173,12 @@ class TexelStage(Stage):
             "quads": torch.from_numpy(self.mesh.quads),
             "shell_cells": torch.from_numpy(self.mesh.shell_cells),
             "vertices": self.mesh.vertices,
+            "vertex_moments": self._vertices.moments,
         }
 
     def restore_own(self, state: dict[str, Any]) -> None:
         self._updates.copy_(state["updates"])
+        self._vertices.restore(state["vertex_moments"])
 
 
 def _texel_points(mesh: QuadMesh, K: int) -> list[Tensor]:

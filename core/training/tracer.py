@@ -1,6 +1,6 @@
 """Traces pixels' sub-rays against a quad mesh, composites what they hit, and takes the gradient back."""
 
-from typing import Any
+from typing import Any, Protocol
 
 import torch
 import warp as wp
@@ -9,10 +9,21 @@ from torch import Tensor
 from core.field.frame import as_vec3, empty
 from core.kernels.composite import PixelSums
 from core.kernels.launch import launch
+from core.kernels.silhouettes import silhouette_gradient
 from core.kernels.trace import Hits, bound_quads
 from core.kernels.types import vec8
 from core.mesh.quad_mesh import QuadMesh
 from core.training.pixels import Batch
+
+
+class Rays(Protocol):
+    """Origins and directions [n, 3] in the scene's frame."""
+
+    @property
+    def origins(self) -> Tensor: ...
+
+    @property
+    def directions(self) -> Tensor: ...
 
 
 class Tracer:
@@ -29,18 +40,18 @@ class Tracer:
         self.quad = empty(*shape, device=self.device, dtype=torch.int32)
         self.alpha, self.transmittance = empty(*shape, device=self.device), empty(*shape, device=self.device)
         self.count = empty(shape[0], device=self.device, dtype=torch.int32)
-        self._ab, self._t = empty(*shape, 2, device=self.device), empty(*shape, device=self.device)
+        self._ab, self.t = empty(*shape, 2, device=self.device), empty(*shape, device=self.device)
         self._features = empty(*shape, 8, device=self.device)
-        self._hits = self._kernel_hits()
+        self.hits = self._kernel_hits()
         self._continuous, self._binary = self._new_sums(), self._new_sums()
 
-    def forward(self, batch: Batch, surface: Any, *, binary_only: bool) -> tuple[tuple[Tensor, Tensor], ...]:
+    def forward(self, batch: Rays, surface: Any, *, binary_only: bool) -> tuple[tuple[Tensor, Tensor], ...]:
         """((features times coverage [n, 8], coverage [n]) of the continuous model, the same of the binary one)."""
         rays = [as_vec3(batch.origins), as_vec3(batch.directions)]
         launch(self._trace, self.pixels * self.subrays,
-               [self.kernel_mesh, surface, *rays, int(binary_only), self._hits], self.device)  # fmt: skip
+               [self.kernel_mesh, surface, *rays, int(binary_only), self.hits], self.device)  # fmt: skip
         sums = [_kernel_sums(*self._continuous), _kernel_sums(*self._binary)]
-        launch(self._composite, self.pixels, [surface, *rays, self.subrays, self._hits, *sums], self.device)
+        launch(self._composite, self.pixels, [surface, *rays, self.subrays, self.hits, *sums], self.device)
         return tuple((F.clone(), A.clone()) for F, A in (self._continuous, self._binary))
 
     def backward(
@@ -55,8 +66,15 @@ class Tracer:
         """Adds the gradients of the last `forward` to the accumulators."""
         rays = [as_vec3(batch.origins), as_vec3(batch.directions)]
         grads = [_kernel_sums(*grad_continuous), _kernel_sums(*grad_binary)]
-        shared = [self.kernel_mesh, surface, *rays, self.subrays, self._hits, *grads]
+        shared = [self.kernel_mesh, surface, *rays, self.subrays, self.hits, *grads]
         launch(self._backward, self.pixels, lambda part: [*shared, part, gradients], self.device, parts)
+
+    def silhouettes(self, batch: Batch, grad_binary: tuple[Tensor, ...], gap: float, parts: int, vertices: Any) -> None:
+        """Adds the gradients of the last `forward`'s silhouettes, where depths differ by more than `gap`, to the
+        vertices' accumulators. Needs four sub-rays a pixel."""
+        shared = [self.kernel_mesh, as_vec3(batch.origins), as_vec3(batch.directions), self.hits,
+                  _kernel_sums(*grad_binary), gap]  # fmt: skip
+        launch(silhouette_gradient, self.pixels, lambda part: [*shared, part, vertices], self.device, parts)
 
     def vertices_moved(self) -> None:
         """To be called when the mesh's vertices have changed."""
@@ -74,7 +92,7 @@ class Tracer:
     def _kernel_hits(self) -> Hits:
         hits = Hits()
         hits.quad, hits.ab = wp.from_torch(self.quad), wp.from_torch(self._ab, dtype=wp.vec2)
-        hits.t, hits.alpha = wp.from_torch(self._t), wp.from_torch(self.alpha)
+        hits.t, hits.alpha = wp.from_torch(self.t), wp.from_torch(self.alpha)
         hits.transmittance = wp.from_torch(self.transmittance)
         hits.features, hits.count = wp.from_torch(self._features, dtype=vec8), wp.from_torch(self.count)
         return hits

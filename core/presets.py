@@ -60,12 +60,12 @@ LIMITS: dict[str, tuple[float, float]] = {
 }
 
 PRESETS: dict[str, Settings] = {
-    "draft": Settings("draft", cells=64, patch=5, nodes=128, voxel_steps=800, field_steps=300, texel_steps=500),
+    "draft": Settings("draft", cells=64, patch=5, nodes=128, voxel_steps=800, field_steps=400, texel_steps=500),
     "balanced": Settings(
-        "balanced", cells=96, patch=7, nodes=256, voxel_steps=2600, field_steps=2800, texel_steps=2500
+        "balanced", cells=96, patch=8, nodes=256, voxel_steps=3400, field_steps=2400, texel_steps=2500
     ),
     # Most steps go where cells are fine: into the field stage (docs/training.md).
-    "high": Settings("high", cells=128, patch=7, nodes=256, voxel_steps=3400, field_steps=5600, texel_steps=1800),
+    "high": Settings("high", cells=128, patch=8, nodes=256, voxel_steps=3800, field_steps=5000, texel_steps=2400),
 }
 
 

@@ -34,7 +34,7 @@ from core.training.voxel_stage import VoxelStage
 FEATURE_RATE, ALPHA_RATE, NETWORK_RATE = 0.01, 0.02, 2e-3
 # In cells. Vertices start on the surface, and faster ones leave it again: still_lambert, 600 steps, four sub-rays:
 # 26.5 dB at 0.02, 27.0 at 0.008, 26.8 at 0.003, 26.4 at 0.001. A pull to their cells' centres (eq. 6) changes nothing.
-VERTEX_RATE, VERTEX_PULL = 0.006, 0.0
+VERTEX_RATE, VERTEX_PULL = 0.01, 0.0
 # A node or vertex is touched once in a dozen steps: with a short memory its last few gradients alone say how large its
 # steps are. lego_400, 600 steps, baked: 28.94 dB at 0.95, 29.27 at 0.99, 29.46 at 0.997, 29.48 at 0.999.
 BETA2 = 0.997

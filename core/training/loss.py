@@ -6,11 +6,12 @@ from torch import Tensor
 
 
 def pixel_loss(color: Tensor, coverage: Tensor, true_color: Tensor, true_alpha: Tensor, weight: float) -> Tensor:
-    """Mean squared error of the picture over white (eq. 1), and of coverage.
+    """Mean squared error of the picture (eq. 1), over white and over black alike, and of coverage.
 
-    Over white the error is dC - dA, for an error dC of the colour and dA of the coverage: the two may cancel where the
-    object is as white as the background. The coverage's own error, which photos with an alpha channel tell, keeps them
-    apart.
+    Over a background b the error is dC - b dA, for an error dC of the colour and dA of the coverage: over white alone
+    the two may cancel where the object is as white as the background, and chips of white then stand around it over any
+    other. In the mean over white and black they cannot. (Still life and sample: over white 0.1 and 0.0 dB less than
+    with white alone, over grey 0.3 dB more, over black 0.5 and 0.8.)
 
     Args:
         color, true_color: [n, 3], times coverage or alpha.
@@ -19,8 +20,8 @@ def pixel_loss(color: Tensor, coverage: Tensor, true_color: Tensor, true_alpha: 
     """
     d_color = color - true_color
     d_alpha = (coverage - true_alpha)[:, None]
-    over_white = ((d_color - d_alpha) ** 2).mean()
-    return over_white + weight * (d_alpha**2).mean()
+    over_white, over_black = ((d_color - d_alpha) ** 2).mean(), (d_color**2).mean()
+    return 0.5 * (over_white + over_black) + weight * (d_alpha**2).mean()
 
 
 def psnr_of(errors: list[float]) -> float:

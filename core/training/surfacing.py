@@ -38,7 +38,7 @@ HIT_CAPACITY = 24
 # cell holds together; its vertices then go where they belong. docs/training.md.
 OUTSIDE = 0.15  # cells
 # A ray is explained by a mesh that it meets so near to where the field ends it.
-EXPLAINED = 1.0  # cells
+EXPLAINED = 0.5  # cells
 # Cells where so many of the rays that end there, and so large a share, meet the mesh elsewhere get more quads.
 UNEXPLAINED_RAYS, UNEXPLAINED_SHARE = 2, 0.15
 # Hits this near to where the field ends a ray speak for opacity.

@@ -20,7 +20,7 @@ from core.field.region import Region
 from core.field.voxels import VoxelField
 from core.mesh import quad_mesh
 from core.presets import Settings
-from core.training import field_stage, pixels, texel_stage
+from core.training import field_stage, pixels, surfacing, texel_stage, vertices
 from core.training.tracer import Tracer
 from core.training.voxel_stage import VoxelStage
 
@@ -65,12 +65,12 @@ def _constants(*changes: tuple[Any, str, Any]) -> Iterator[None]:
 
 def _fixed_grid() -> AbstractContextManager[None]:
     """Vertices stay in their cells' centres."""
-    return _constants((quad_mesh, "VERTEX_REACH", 0.0), (field_stage, "VERTEX_REACH", 0.0))
+    return _constants(*((module, "VERTEX_REACH", 0.0) for module in (quad_mesh, surfacing, vertices)))
 
 
 def _placed_vertices() -> AbstractContextManager[None]:
     """Vertices stay where the survey puts them."""
-    return _constants((field_stage, "VERTEX_RATE", 0.0), (field_stage, "VERTEX_PULL", 0.0))
+    return _constants((field_stage, "VERTEX_RATE", 0.0), (texel_stage, "VERTEX_RATE", 0.0))
 
 
 @contextmanager

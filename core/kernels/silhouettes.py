@@ -5,6 +5,8 @@ it, no derivative of either tells that the edge between them might move. But the
 as even. If the nearer surface grows by e towards the other ray, which passes at a distance s, it takes that one over
 with probability e / s. So with G, what the loss gains where the other ray shows the nearer surface, dL/de = G / s
 (edge sampling: Li et al. 2018; here in expectation, without looking for the edge).
+
+Half of the edges lie between two pixels' sub-rays instead of one's. Those within pixels stand for them, twofold.
 """
 
 import warp as wp
@@ -66,7 +68,7 @@ def silhouette_gradient(
             apart = wp.length_sq(way)
             q = mesh.quads[hits.quad[near, k_near]]
             if q[0] < mesh.movable and apart > 0.0:
-                g = way * (gain / apart)
+                g = way * (2.0 * gain / apart)
                 ab = hits.ab[near, k_near]
                 weights = corner_weights(ab)
                 middle = wp.where(ab[1] >= ab[0], q[1], q[2])

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks import stability
 from benchmarks.stability import CASES, Lab
-from core.training import field_stage
+from core.training import surfacing
 
 SETTINGS = {
     "cells": 16, "patch": 3, "nodes": 20, "voxel_steps": 40, "field_steps": 20, "texel_steps": 20,
@@ -24,7 +24,7 @@ def lab(tmp_path_factory) -> Iterator[Lab]:
     """Converts in this process: what is asked here is not how much memory it takes."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(stability, "in_child", lambda function, *arguments: function(*arguments))
-        patch.setattr(field_stage, "SURVEY_RAYS", 32_768)
+        patch.setattr(surfacing, "SURVEY_RAYS", 32_768)
         yield Lab(tmp_path_factory.mktemp("stability"), SETTINGS, PHOTOS, device="cpu")
 
 

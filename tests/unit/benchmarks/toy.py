@@ -7,7 +7,7 @@ import pytest
 
 from core import reconstruct as module
 from core.presets import settings_for
-from core.training import field_stage
+from core.training import surfacing
 
 HASTY = settings_for(
     "draft", cells=16, patch=3, nodes=20, voxel_steps=30, field_steps=15, texel_steps=15,
@@ -18,6 +18,6 @@ HASTY = settings_for(
 @contextmanager
 def small_survey() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(field_stage, "SURVEY_RAYS", 32_768)
+        patch.setattr(surfacing, "SURVEY_RAYS", 32_768)
         patch.setattr(module, "REPORT_INTERVAL_S", 0.0)  # reports of every step
         yield

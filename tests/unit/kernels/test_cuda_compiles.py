@@ -14,9 +14,10 @@ COMPILE = """
 import sys
 import warp as wp
 from pathlib import Path
-from core.kernels import adam, camera_rays, march, smoothness, surfaces, trace
+from core.kernels import adam, camera_rays, fusion, march, silhouettes, smoothness, surfaces, trace
 
-modules = {module.__name__.split(".")[-1]: module for module in (adam, camera_rays, march, smoothness, surfaces, trace)}
+plain = (adam, camera_rays, fusion, march, silhouettes, smoothness, surfaces, trace)
+modules = {module.__name__.split(".")[-1]: module for module in plain}
 for surface, kernels in (("volume", surfaces.VOLUME_KERNELS), ("texels", surfaces.TEXEL_KERNELS)):
     for step, kernel in zip(("trace", "composite", "backward"), kernels, strict=True):
         modules[f"{surface}-{step}"] = kernel.module
@@ -26,7 +27,7 @@ for name in sys.argv[2:]:
     wp.compile_aot_module(modules[name], arch=75, module_dir=folder, strip_hash=True)
 """
 STEPS = [f"{surface}-{step}" for surface in ("volume", "texels") for step in ("trace", "composite", "backward")]
-MODULES = ["adam", "camera_rays", "march", "smoothness", "surfaces", "trace", *STEPS]
+MODULES = ["adam", "camera_rays", "fusion", "march", "silhouettes", "smoothness", "surfaces", "trace", *STEPS]
 ROOT = Path(__file__).parents[3]
 
 

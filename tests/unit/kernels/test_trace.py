@@ -39,7 +39,7 @@ def traced(mesh: QuadMesh, rays, surface=None, *, capacity: int = 64, binary_onl
 def hits_of(tracer: Tracer, ray: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """(quad, t, ab) of a ray."""
     n = int(tracer.count[ray])
-    return tuple(a[ray, :n].cpu() for a in (tracer.quad, tracer._t, tracer._ab))
+    return tuple(a[ray, :n].cpu() for a in (tracer.quad, tracer.t, tracer._ab))
 
 
 def oracle_hits(mesh: QuadMesh, rays, index: int, margin: float = 0.0) -> RayHits:

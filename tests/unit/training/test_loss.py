@@ -19,11 +19,15 @@ def over(color: torch.Tensor, coverage: torch.Tensor, background: float) -> torc
     return color + (1.0 - coverage)[:, None] * background
 
 
-def test_the_loss_is_the_error_over_white_and_the_weighted_error_of_coverage(rng):
-    color, coverage, true, alpha = pixels(rng)
-    expected = ((over(color, coverage, 1.0) - over(true, alpha, 1.0)) ** 2).mean()
-    expected = expected + 0.3 * ((coverage - alpha) ** 2).mean()
-    torch.testing.assert_close(pixel_loss(color, coverage, true, alpha, 0.3), expected)
+def error_over(pixels_: tuple[torch.Tensor, ...], background: float) -> torch.Tensor:
+    color, coverage, true, alpha = pixels_
+    return ((over(color, coverage, background) - over(true, alpha, background)) ** 2).mean()
+
+
+def test_the_loss_is_the_error_over_white_and_black_and_the_weighted_error_of_coverage(rng):
+    some = pixels(rng)
+    expected = (error_over(some, 1.0) + error_over(some, 0.0)) / 2 + 0.3 * ((some[1] - some[3]) ** 2).mean()
+    torch.testing.assert_close(pixel_loss(*some, 0.3), expected)
 
 
 def test_the_loss_is_zero_exactly_for_the_photo(rng):
@@ -31,17 +35,15 @@ def test_the_loss_is_zero_exactly_for_the_photo(rng):
     assert pixel_loss(true, alpha, true, alpha, 0.5) == 0.0
 
 
-def test_without_a_weight_an_object_as_white_as_the_background_needs_no_coverage():
-    alpha = torch.ones(4)
+@pytest.mark.parametrize("shade_of_grey", [0.0, 0.5, 1.0])
+def test_an_object_as_bright_as_a_background_needs_coverage_all_the_same(shade_of_grey):
     nothing = torch.zeros(4, 3), torch.zeros(4)
-    assert pixel_loss(*nothing, torch.ones(4, 3), alpha, 0.0) == 0.0
-    assert pixel_loss(*nothing, torch.ones(4, 3), alpha, 0.1) > 0.0
+    assert pixel_loss(*nothing, torch.full((4, 3), shade_of_grey), torch.ones(4), 0.0) > 0.1
 
 
 def test_reported_error_is_the_error_over_white(rng):
-    color, coverage, true, alpha = pixels(rng)
-    expected = float(pixel_loss(color, coverage, true, alpha, 0.0))
-    assert color_error(color, coverage, true, alpha) == pytest.approx(expected)
+    some = pixels(rng)
+    assert color_error(*some) == pytest.approx(float(error_over(some, 1.0)))
 
 
 @pytest.mark.parametrize(("errors", "psnr"), [([0.01, 0.01], 20.0), ([0.0], 100.0), ([0.0, 2.0], 0.0), ([], 0.0)])

@@ -19,7 +19,7 @@ from core.evaluation import evaluate
 from core.presets import PRESETS, Settings, settings_for
 from core.progress import Progress
 from core.reconstruct import Reconstruction, reconstruct, stage_shares
-from core.training import field_stage
+from core.training import surfacing
 from core.training.tracer import Tracer
 from core.training.voxel_stage import VoxelStage
 from tests.unit.training.captures import ball, capture_of
@@ -37,7 +37,7 @@ HASTY = replace(SETTINGS, voxel_steps=30, field_steps=15, texel_steps=15)
 @pytest.fixture(autouse=True, scope="module")
 def small_survey() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(field_stage, "SURVEY_RAYS", 32_768)
+        patch.setattr(surfacing, "SURVEY_RAYS", 32_768)
         patch.setattr(module, "REPORT_INTERVAL_S", 0.0)  # reports of every step
         yield
 

@@ -39,7 +39,7 @@ def test_a_baked_texel_is_looked_up_where_it_was_baked(rng, device, K):
     _, (F, A) = tracer.forward(batch_of(*rays, device), opaque, binary_only=True)
     hit = A.cpu().numpy() > 0
     assert hit.sum() > 100
-    place = rays[0] + tracer._t[:, :1].cpu().numpy() * rays[1]
+    place = rays[0] + tracer.t[:, :1].cpu().numpy() * rays[1]
     # A texel's centre is within half a texel, along a and along b, of every place that shows it.
     corners = mesh.vertices.cpu().numpy()[mesh.quads[tracer.quad[:, 0].cpu().numpy()[hit]]]
     edges = np.linalg.norm(corners[:, [1, 3, 2, 0]] - corners[:, [0, 1, 3, 2]], axis=-1).max(1)

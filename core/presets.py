@@ -60,7 +60,7 @@ LIMITS: dict[str, tuple[float, float]] = {
 }
 
 PRESETS: dict[str, Settings] = {
-    "draft": Settings("draft", cells=64, patch=5, nodes=128, voxel_steps=800, field_steps=400, texel_steps=500),
+    "draft": Settings("draft", cells=64, patch=5, nodes=128, voxel_steps=1000, field_steps=500, texel_steps=700),
     "balanced": Settings(
         "balanced", cells=96, patch=8, nodes=256, voxel_steps=3400, field_steps=2400, texel_steps=2500
     ),

@@ -138,7 +138,7 @@ def test_the_surface_that_pictures_agree_on_is_the_balls(rng, device, radius):
     assert (distance(ways * (radius - 0.4 * cell)) < 0).all()
     assert (distance(ways * (radius + 0.4 * cell)) > 0).all()
     distance.level = 0.3
-    assert (distance(ways * radius) < 0).mean() > 0.9  # without a level, half of them
+    assert (distance(ways * radius) < 0).mean() > 0.8  # without a level, half of them
 
 
 def test_a_thin_things_back_does_not_hide_its_front(rng, device):

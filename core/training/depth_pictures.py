@@ -72,6 +72,8 @@ class SurfaceDistance:
 
     def known(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(distances [n], whether any picture knows [n] bool)."""
+        if len(places) == 0:  # Warp takes no empty arrays of vectors
+            return np.zeros(0), np.zeros(0, bool)
         scene = self._space.cells_to_scene(places).astype(np.float32)
         points = torch.from_numpy(np.ascontiguousarray(scene)).to(self._device)
         distance, weight = (empty(len(points), device=self._device) for _ in range(2))

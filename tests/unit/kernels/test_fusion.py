@@ -141,6 +141,12 @@ def test_the_surface_that_pictures_agree_on_is_the_balls(rng, device, radius):
     assert (distance(ways * radius) < 0).mean() > 0.8  # without a level, half of them
 
 
+def test_no_points_have_no_distances(device):
+    camera = ring(1, 8)[0]
+    distance = SurfaceDistance(pictures_of([camera], [ball_depth(camera)], device), Space.cube(), CELLS, device)
+    assert distance(np.zeros((0, 3))).shape == (0,)
+
+
 def test_a_thin_things_back_does_not_hide_its_front(rng, device):
     """A plate thinner than a cell is solid inside and clear on either side."""
     places = [(3.0, 0.1, 0.3), (-3.0, 0.1, 0.3)]

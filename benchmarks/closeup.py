@@ -19,8 +19,7 @@ import numpy as np
 from PIL import Image
 from scipy import ndimage
 
-from benchmarks.child_process import in_child
-from benchmarks.geometry import train_variant, true_depths
+from benchmarks.geometry import assets_of, true_depths
 from benchmarks.hardware import hardware
 from benchmarks.tables import figure, markdown, merged
 from core.camera import Camera
@@ -158,10 +157,7 @@ def main() -> int:
 def _measured(arguments: argparse.Namespace, folder: Path) -> tuple[list[CloseupRow], np.ndarray]:
     device = resolve_device(arguments.device)
     write_sample_capture(folder)
-    assets = {name: Path(path).read_bytes() for name, path in (text.split("=", 1) for text in arguments.glb)}
-    for variant in arguments.variants or ([] if assets else ["draft"]):
-        assets[variant] = in_child(train_variant, folder, variant, device, arguments.seed)
-        print(f"trained: {variant}", flush=True)
+    assets = assets_of(arguments, folder, device)
     return measure(assets, read_capture(folder), arguments.size, hardware(device), arguments.view)
 
 

@@ -81,6 +81,15 @@ def train_variant(folder: Path, variant: str, device: str, seed: int) -> bytes:
     return write_glb(reconstruct(read_capture(folder), settings, device=device, seed=seed).scene)[SCENE]
 
 
+def assets_of(arguments: argparse.Namespace, folder: Path, device: str) -> dict[str, bytes]:
+    """The .glb files that were given, and those of the variants, trained one after the other on the capture."""
+    assets = {name: Path(path).read_bytes() for name, path in (text.split("=", 1) for text in arguments.glb)}
+    for variant in arguments.variants or ([] if assets else ["draft"]):
+        assets[variant] = in_child(train_variant, folder, variant, device, arguments.seed)
+        print(f"trained: {variant}", flush=True)
+    return assets
+
+
 def true_depths(capture: Capture, cameras: Sequence[Camera], seed: int = 0) -> list[np.ndarray]:
     """[height, width] each: the sample's true distance along the rays of cameras; object units."""
     studio = Studio(seed, lights=1)
@@ -159,10 +168,7 @@ def main() -> int:
 def _measured(arguments: argparse.Namespace, folder: Path) -> tuple[list[GeometryRow], np.ndarray]:
     device = resolve_device(arguments.device)
     write_sample_capture(folder, size_px=arguments.size, train_views=arguments.views, test_views=arguments.held_out)
-    assets = {name: Path(path).read_bytes() for name, path in (text.split("=", 1) for text in arguments.glb)}
-    for variant in arguments.variants or ([] if assets else ["draft"]):
-        assets[variant] = in_child(train_variant, folder, variant, device, arguments.seed)
-        print(f"trained: {variant}", flush=True)
+    assets = assets_of(arguments, folder, device)
     words = (f"{arguments.views} of {arguments.size} px", hardware(device))
     return measure(assets, read_capture(folder), words, arguments.view)
 

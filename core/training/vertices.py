@@ -36,6 +36,8 @@ class MovingVertices:
 
     def step(self, rate: float, pull: float, steps: int) -> None:
         """One step of each vertex that has a gradient. Args: rate: in cells. steps: taken, this one included."""
+        if len(self._mesh.kept) == 0:  # shells alone, which stay where they are
+            return
         size = self._mesh.cell_size
         value, m1, m2, centres = (as_vec3(t) for t in (self._mesh.vertices, *self.moments, self._centres))
         inputs = [self._space, value, self.gradients, m1, m2, centres, VERTEX_REACH * size, rate * size, pull,

@@ -16,6 +16,9 @@ from core.mesh.quad_mesh import QuadMesh
 from core.training.pixels import Batch
 
 
+SUBRAYS_IN_PAIRS = 4  # what the kernel of silhouettes reads of each pixel, in rows of two
+
+
 class Rays(Protocol):
     """Origins and directions [n, 3] in the scene's frame."""
 
@@ -71,7 +74,9 @@ class Tracer:
 
     def silhouettes(self, batch: Batch, grad_binary: tuple[Tensor, ...], gap: float, parts: int, vertices: Any) -> None:
         """Adds the gradients of the last `forward`'s silhouettes, where depths differ by more than `gap`, to the
-        vertices' accumulators. Needs four sub-rays a pixel."""
+        vertices' accumulators. A pixel of other than four sub-rays has no pairs to look at, and adds nothing."""
+        if self.subrays != SUBRAYS_IN_PAIRS:
+            return
         shared = [self.kernel_mesh, as_vec3(batch.origins), as_vec3(batch.directions), self.hits,
                   _kernel_sums(*grad_binary), gap]  # fmt: skip
         launch(silhouette_gradient, self.pixels, lambda part: [*shared, part, vertices], self.device, parts)

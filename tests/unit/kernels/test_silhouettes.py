@@ -109,3 +109,19 @@ def test_transparent_texels_have_no_silhouette(rng, device):
     batch, _ = pixels_over(rng, device, 1)
     clear = np.zeros((len(mesh.quads), 2, 2))
     assert np.abs(gradient(mesh, batch, F_SHEET, np.ones(8), 1.0, clear)).max() == 0.0
+
+
+@pytest.mark.parametrize("subrays", [1, 2])
+def test_pixels_without_four_sub_rays_move_nothing(rng, device, subrays):
+    """The kernel would read beyond the rays."""
+    mesh = sheet(4, device=device)
+    batch, _ = pixels_over(rng, device, 1)
+    pixels = len(batch.origins) // subrays
+    shape = (len(mesh.quads), 2, 2)
+    tracer = Tracer(mesh, TEXEL_KERNELS, pixels, subrays, 8)
+    tracer.forward(batch, texels_of(np.ones(shape), np.ones((*shape, 8)), device), binary_only=True)
+    grads = torch.ones(pixels, 8, device=device), torch.ones(pixels, device=device)
+    parts = accumulator_parts(device)
+    total = torch.zeros(parts, *mesh.vertices.shape, device=device)
+    tracer.silhouettes(batch, grads, GAP, parts, as_vec3(total))
+    assert float(total.abs().max()) == 0.0

@@ -15,7 +15,6 @@ from core.kernels.types import vec8
 from core.mesh.quad_mesh import QuadMesh
 from core.training.pixels import Batch
 
-
 SUBRAYS_IN_PAIRS = 4  # what the kernel of silhouettes reads of each pixel, in rows of two
 
 

@@ -10,12 +10,12 @@ from core.conventions import FEATURE_CHANNELS
 from core.mesh import quad_mesh
 from core.presets import replace, settings_for
 from core.reconstruct import reconstruct
-from core.training import field_stage, pixels, texel_stage, voxel_stage
-from core.training.field_stage import FieldStage
+from core.training import field_stage, pixels, surfacing, texel_stage, vertices, voxel_stage
+from core.training.vertices import MovingVertices
 from tests.unit.benchmarks.toy import HASTY, small_survey
 from tests.unit.training.captures import ball, capture_of
 
-MODULES = (quad_mesh, field_stage, pixels, texel_stage, voxel_stage)
+MODULES = (quad_mesh, field_stage, pixels, surfacing, texel_stage, vertices, voxel_stage)
 TOO_LARGE_HERE = ("K = 33",)  # half a minute for what K = 17 shows
 
 
@@ -64,16 +64,17 @@ def test_without_view_dependence_the_network_does_not_look_at_the_direction(capt
 
 @pytest.mark.parametrize(("words", "in_the_middle"), [("fixed grid", True), ("placed by the survey", False)])
 def test_vertices_that_are_not_trained_stay(capture, monkeypatch, words, in_the_middle):
-    moved, middle, step = [], [], FieldStage._step_vertices
+    moved, middle, step = [], [], MovingVertices.step
 
-    def watched(stage, rate):
-        before = stage.mesh.vertices.clone()
-        step(stage, rate)
-        moved.append(float((stage.mesh.vertices - before).abs().max()))
-        centres = torch.from_numpy(stage.mesh.centres())
-        middle.append(float((stage.mesh.vertices[: len(centres)] - centres).abs().max()))
+    def watched(moving, *arguments):
+        mesh = moving._mesh
+        before = mesh.vertices.clone()
+        step(moving, *arguments)
+        moved.append(float((mesh.vertices - before).abs().max()))
+        centres = torch.from_numpy(mesh.centres())
+        middle.append(float((mesh.vertices[: len(centres)] - centres).abs().max()))
 
-    monkeypatch.setattr(FieldStage, "_step_vertices", watched)
+    monkeypatch.setattr(MovingVertices, "step", watched)
     trained(named(words), capture)
     assert max(moved) < 1e-6  # float32's rounding in clamping to the cell
     assert (max(middle) < 1e-6) is in_the_middle

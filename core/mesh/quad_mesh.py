@@ -112,22 +112,6 @@ def shells_around(space: Space, cells: int) -> int:
     return cells // 2 if space.kind == SHELLS else 0
 
 
-def build_mesh(
-    solid: np.ndarray, centroid: np.ndarray, device: str, space: Space | None = None, shells: np.ndarray | None = None
-) -> QuadMesh:
-    """The mesh between solid cells, and the shells' seen quads.
-
-    Args:
-        solid: [P, P, P] bool, cells that rays saw something in.
-        centroid: [P, P, P, 3], where in the cells' cube they saw it; not finite where unknown.
-        shells: [shells + 1, 6, P, P] bool, cells of the shells' faces that rays saw something near.
-
-    Raises:
-        TrainingFailed: no quad is left.
-    """
-    return mesh_of(quads_between(solid), centroid.reshape(-1, 3), solid.shape[0], device, space, shells)
-
-
 def quads_between(solid: np.ndarray) -> np.ndarray:
     """[n, 4] flat indices of the four cells around each grid edge, where all four are solid [P, P, P] (bool)."""
     index = np.arange(solid.size).reshape(solid.shape)
@@ -148,7 +132,7 @@ def mesh_of(
         corners: [n, 4] flat indices of the cells whose vertices are the corners of each quad.
         places: [P^3, 3], where in the cells' cube each cell's vertex starts; its centre where not finite.
         cells: P.
-        shells: as for `build_mesh`.
+        shells: [shells + 1, 6, P, P] bool, cells of the shells' faces that rays saw something near.
 
     Raises:
         TrainingFailed: no quad is left.

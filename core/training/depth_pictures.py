@@ -57,13 +57,13 @@ def depth_pictures(marcher: Marcher, cameras: Sequence[Camera], frame: Frame) ->
 class SurfaceDistance:
     """How far points lie before the surface that pictures agree on, in cells; see `fuse_depths`.
 
-    Attributes:
+    Args:
         level: what counts as 0. Above 0, the surface lies outside of the one that half of the pictures would name.
     """
 
-    def __init__(self, pictures: DepthPictures, space: Space, cells: int, device: str) -> None:
+    def __init__(self, pictures: DepthPictures, space: Space, cells: int, device: str, level: float = 0.0) -> None:
         self._pictures, self._space, self._cells, self._device = pictures, space, cells, device
-        self.level = 0.0
+        self._level = level
 
     def __call__(self, places: np.ndarray) -> np.ndarray:
         """[n] float64 in [-1, 1] - level, of points [n, 3] of the cells' cube; where no picture knows, as inside."""
@@ -81,7 +81,7 @@ class SurfaceDistance:
         inputs = [self._space.kernel_space(), self._pictures, as_vec3(points), band, HIDDEN / BAND,
                   wp.from_torch(distance), wp.from_torch(weight)]  # fmt: skip
         launch(fuse_depths, len(points), inputs, self._device)
-        return distance.cpu().numpy().astype(np.float64) - self.level, weight.cpu().numpy() > 0
+        return distance.cpu().numpy().astype(np.float64) - self._level, weight.cpu().numpy() > 0
 
 
 def _scaled(size_px: tuple[int, int], share: float) -> tuple[int, int]:

@@ -9,15 +9,13 @@ from typing import Any
 
 import torch
 import warp as wp
-from torch import Tensor, nn
+from torch import nn
 
 from core.field.bricks import places_in
-from core.field.frame import as_vec3, empty
 from core.field.network import shade
 from core.field.parameters import Parameters
 from core.field.space import Space
-from core.kernels.launch import launch
-from core.kernels.surfaces import VOLUME_KERNELS, Volume, VolumeGradients, sample_volume
+from core.kernels.surfaces import VOLUME_KERNELS, VolumeGradients
 from core.kernels.types import vec8
 from core.mesh.quad_mesh import QuadMesh
 from core.presets import Settings
@@ -29,6 +27,7 @@ from core.training.stage import Stage
 from core.training.surfacing import HIT_CAPACITY, surfaced
 from core.training.tracer import Tracer
 from core.training.vertices import MovingVertices
+from core.training.volume import volume_of
 from core.training.voxel_stage import VoxelStage
 
 FEATURE_RATE, ALPHA_RATE, NETWORK_RATE = 0.01, 0.02, 2e-3
@@ -153,21 +152,3 @@ class FieldStage(Stage):
     def restore_own(self, state: dict[str, Any]) -> None:
         self._vertices.restore(state["vertex_moments"])
         self.seen = state["seen"].to(self.device)
-
-
-def volume_of(space: Space, nodes: int, parameters: Parameters) -> Volume:
-    """The volume as kernels read it."""
-    volume = Volume()
-    volume.space = space.kernel_space()
-    volume.nodes = nodes
-    volume.alpha = wp.from_torch(parameters.scalar)
-    volume.features = wp.from_torch(parameters.features, dtype=vec8)
-    return volume
-
-
-def sampled(volume: Volume, points: Tensor, device: str) -> tuple[Tensor, Tensor]:
-    """Opacity [n] and features [n, 8] of a volume at points [n, 3] of the cube."""
-    alpha, features = empty(len(points), device=device), empty(len(points), 8, device=device)
-    outputs = [wp.from_torch(alpha), wp.from_torch(features, dtype=vec8)]
-    launch(sample_volume, len(points), [volume, as_vec3(points), *outputs], device)
-    return alpha, features

@@ -5,7 +5,7 @@ show (thin things, haze) gets the paper's other quads: cells around it, and all 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -20,10 +20,10 @@ from core.field.bricks import to_bricks
 from core.field.frame import Frame, as_vec3, empty
 from core.field.space import SHELLS
 from core.field.voxels import DENSITY_SCALE, VoxelField
-from core.kernels.fusion import compare_depths, vote_opacity
+from core.kernels.fusion import DepthPictures, compare_depths, vote_opacity
 from core.kernels.launch import accumulator_parts, launch
 from core.kernels.surfaces import VOLUME_KERNELS, Volume
-from core.kernels.types import FAR, vec8
+from core.kernels.types import FAR
 from core.mesh.quad_mesh import FACES, VERTEX_REACH, QuadMesh, mesh_of, quads_between, shells_around
 from core.mesh.surface import pulled_to_surface, surface_of
 from core.training.depth_pictures import BAND, SurfaceDistance, depth_pictures, last_depths
@@ -31,6 +31,7 @@ from core.training.marcher import Marcher
 from core.training.pixels import PixelPool
 from core.training.survey import Survey
 from core.training.tracer import Tracer
+from core.training.volume import volume_of
 
 SURVEY_RAYS, SURVEY_BATCH = 400_000, 8192
 HIT_CAPACITY = 24
@@ -72,8 +73,7 @@ def surfaced(
     """
     marcher = Marcher(field, device)
     survey, rays = _surveyed(marcher, pool, cells)
-    distance = SurfaceDistance(depth_pictures(marcher, cameras, frame), field.space, cells, device)
-    corners, places = _surface(distance, field, cells)
+    corners, places = _surface(depth_pictures(marcher, cameras, frame), field, cells, device)
     shells = _seen_shells(survey)
     if len(corners):
         met = _first_hits(mesh_of(corners, places, cells, device, field.space), field, rays)
@@ -106,11 +106,10 @@ def _seen_shells(survey: Survey) -> np.ndarray:
     return (survey.shell_peak.amax(0) > SHELL_WEIGHT).cpu().numpy().reshape(-1, FACES, survey.cells, survey.cells)
 
 
-def _surface(distance: SurfaceDistance, field: VoxelField, cells: int) -> tuple[np.ndarray, np.ndarray]:
+def _surface(pictures: DepthPictures, field: VoxelField, cells: int, device: str) -> tuple[np.ndarray, np.ndarray]:
     """(quads [n, 4], places [P^3, 3]) as `surface_of`, with vertices on the surface itself."""
-    distance.level = OUTSIDE
-    quads, places = surface_of(_at_corners(distance, field, cells), distance)
-    distance.level = 0.0
+    from_outside, distance = (SurfaceDistance(pictures, field.space, cells, device, level) for level in (OUTSIDE, 0.0))
+    quads, places = surface_of(_at_corners(from_outside, field, cells), from_outside)
     used = np.unique(quads)
     places[used] = pulled_to_surface(places[used], used, cells, distance, BAND, VERTEX_REACH)
     return quads, places
@@ -209,12 +208,8 @@ def _tracer_of(mesh: QuadMesh) -> Tracer:
 
 def _volume_with(field: VoxelField, alpha: float) -> Volume:
     """The field's volume, equally opaque everywhere."""
-    volume = Volume()
-    volume.space, volume.nodes = field.space.kernel_space(), field.nodes
     everywhere = torch.full_like(field.parameters.scalar, alpha)
-    volume.alpha = wp.from_torch(everywhere)
-    volume.features = wp.from_torch(field.parameters.features, dtype=vec8)
-    return volume
+    return volume_of(field.space, field.nodes, replace(field.parameters, scalar=everywhere))
 
 
 def _batches(rays: SurveyRays) -> Iterator[SurveyRays]:

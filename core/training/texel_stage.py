@@ -24,13 +24,14 @@ from core.kernels.types import vec8
 from core.mesh.quad_mesh import QuadMesh, patch_weights
 from core.presets import Settings
 from core.training.drawing import BatchSequence
-from core.training.field_stage import FieldStage, sampled, volume_of
+from core.training.field_stage import FieldStage
 from core.training.loss import color_error, pixel_loss
 from core.training.pixels import PixelPool
 from core.training.stage import Stage
 from core.training.surfacing import HIT_CAPACITY
 from core.training.tracer import Tracer
 from core.training.vertices import MovingVertices
+from core.training.volume import sampled, volume_of
 
 FEATURE_RATE, ALPHA_RATE, NETWORK_RATE = 0.01, 0.015, 2e-3
 FINAL_RATE = 0.1

@@ -9,9 +9,18 @@ import warp as wp
 from core.field.space import Space
 from core.kernels.surfaces import Texels
 from core.kernels.types import vec8
-from core.mesh.quad_mesh import VERTEX_REACH, QuadMesh, build_mesh
+from core.mesh import quad_mesh
+from core.mesh.quad_mesh import VERTEX_REACH, QuadMesh, quads_between
 
 WIDTH = 2.0
+
+
+def build_mesh(
+    solid: np.ndarray, centroid: np.ndarray, device: str, space: Space | None = None, shells: np.ndarray | None = None
+) -> QuadMesh:
+    """The mesh of all quads between solid cells [P, P, P] (bool), its vertices at the centroids [P, P, P, 3]."""
+    corners, places = quads_between(solid), centroid.reshape(-1, 3)
+    return quad_mesh.mesh_of(corners, places, len(solid), device, space, shells)
 
 
 def mesh_of(

@@ -13,6 +13,7 @@ from core.field.space import Space
 from core.kernels.fusion import DepthPictures, compare_depths, fuse_depths, median_depth, vote_opacity
 from core.kernels.launch import accumulator_parts, launch
 from core.kernels.march import Samples
+from core.kernels.trace import Hits
 from core.kernels.types import FAR, vec8
 from core.training.depth_pictures import SurfaceDistance
 from tests.scenes import look_at_camera
@@ -137,7 +138,7 @@ def test_the_surface_that_pictures_agree_on_is_the_balls(rng, device, radius):
     # A pixel is 0.04 wide at the ball, a third of a cell: that is how well silhouettes are known.
     assert (distance(ways * (radius - 0.4 * cell)) < 0).all()
     assert (distance(ways * (radius + 0.4 * cell)) > 0).all()
-    distance.level = 0.3
+    distance = SurfaceDistance(pictures, Space.cube(), CELLS, device, 0.3)
     assert (distance(ways * radius) < 0).mean() > 0.8  # without a level, half of them
 
 
@@ -228,8 +229,6 @@ def test_depths_are_compared_among_the_cells(rng, device, space):
 
 
 def hits_of(t: np.ndarray, count: np.ndarray, device: str):
-    from core.kernels.trace import Hits
-
     hits = Hits()
     shape = t.shape
     hits.t = wp.array(t.astype(np.float32), dtype=float, device=device)

@@ -6,11 +6,12 @@ import torch
 
 from core.conventions import SUBPIXEL_OFFSETS_PX
 from core.field.frame import as_vec3
+from core.field.space import Space
 from core.kernels.launch import accumulator_parts
 from core.kernels.surfaces import TEXEL_KERNELS
-from core.mesh.quad_mesh import QuadMesh, build_mesh
+from core.mesh.quad_mesh import QuadMesh, shells_around
 from core.training.tracer import Tracer
-from tests.unit.kernels.meshes import texels_of
+from tests.unit.kernels.meshes import build_mesh, texels_of
 from tests.unit.kernels.rays import batch_of
 
 P = 8
@@ -125,3 +126,17 @@ def test_pixels_without_four_sub_rays_move_nothing(rng, device, subrays):
     total = torch.zeros(parts, *mesh.vertices.shape, device=device)
     tracer.silhouettes(batch, grads, GAP, parts, as_vec3(total))
     assert float(total.abs().max()) == 0.0
+
+
+def test_shells_have_an_outline_and_stay_all_the_same(rng, device):
+    """Half of one face of a shell is there: rays from the middle pass its border."""
+    space = Space.shells()
+    shells = np.zeros((shells_around(space, P) + 1, 6, P, P), bool)
+    shells[1, 1, : P // 2] = True  # of +x, where y < 0
+    mesh = build_mesh(np.zeros((P,) * 3, bool), np.full((P, P, P, 3), np.nan), device, space, shells)
+    across = np.column_stack([rng.uniform(-0.02, 0.02, 400), rng.uniform(-0.5, 0.5, 400)])
+    yz = (across[:, None] + SUBPIXEL_OFFSETS_PX * 0.02).reshape(-1, 2)
+    directions = np.column_stack([np.ones(len(yz)), yz])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    batch = batch_of(np.zeros_like(directions), directions, device)
+    assert np.abs(gradient(mesh, batch, F_SHEET, np.ones(8), 1.0)).max() == 0.0

@@ -12,8 +12,8 @@ from core.mesh.quad_mesh import QuadMesh
 from core.oracles import composite as oracle
 from core.oracles.grid import trilinear
 from core.oracles.moving_hits import distances
-from core.training.field_stage import sampled
 from core.training.tracer import Tracer
+from core.training.volume import sampled
 from tests.unit.kernels.meshes import random_mesh
 from tests.unit.kernels.rays import as_float32, batch_of, inside_rays, joined, random_rays
 

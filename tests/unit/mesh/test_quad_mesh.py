@@ -6,8 +6,8 @@ import torch
 
 from core.errors import TrainingFailed
 from core.field.bricks import from_bricks
-from core.mesh.quad_mesh import VERTEX_REACH, QuadMesh, build_mesh, patch_weights
-from tests.unit.kernels.meshes import random_mesh
+from core.mesh.quad_mesh import VERTEX_REACH, QuadMesh, patch_weights
+from tests.unit.kernels.meshes import build_mesh, random_mesh
 
 UNKNOWN = np.nan
 

@@ -11,9 +11,9 @@ from core.field.voxels import EMPTY_DENSITY, HIGHEST_DENSITY, VoxelField
 from core.kernels.surfaces import Volume
 from core.mesh.quad_mesh import VERTEX_REACH
 from core.training import surfacing
-from core.training.field_stage import sampled, volume_of
 from core.training.pixels import PixelPool
 from core.training.surfacing import EXPLAINED, surfaced
+from core.training.volume import sampled, volume_of
 from tests.unit.training.captures import ball, capture_of
 
 CELLS, NODES = 24, 96

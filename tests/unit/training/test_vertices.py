@@ -5,9 +5,9 @@ import pytest
 import torch
 
 from core.field.space import Space
-from core.mesh.quad_mesh import VERTEX_REACH, build_mesh, shells_around
+from core.mesh.quad_mesh import VERTEX_REACH, shells_around
 from core.training.vertices import MovingVertices
-from tests.unit.kernels.meshes import sheet_mesh
+from tests.unit.kernels.meshes import build_mesh, sheet_mesh
 
 P = 8
 
